@@ -58,7 +58,7 @@ NOT_RUN = {
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
-    r"python examples/learning/learn_goal\.py .*": "takes minutes: tests/examples/test_learning.py learns less",
+    r"python examples/learning/learn_goal\.py .*": "takes minutes: tests/examples learns less",
     r"twin bench slam .*": "needs logs that are not shipped: tests/benchmarks/slam has its own",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",

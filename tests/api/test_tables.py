@@ -139,8 +139,9 @@ def test_verdicts_of_many_runs_are_a_table(tmp_path: Path) -> None:
     assert found["sim_time_s"].to_pylist() == [9.5, 9.5, None]
     assert found["error"].to_pylist() == [None, None, "broken"]
     assert polars.from_arrow(found).filter(polars.col("verdict") == "fail")["test"].to_list() == ["a[seed=1]"]
-    (tmp_path / "02" / "verdict.json").write_text("[]", encoding="utf-8")
-    with pytest.raises(RecordingError, match=r"verdict\.json: is no verdict of a run"):
-        twin.read_runs(tmp_path)
+    for wrong in ("[]", '{"scenario": "a", "verdict": "pass", "checks": [1], "metrics": {}}'):
+        (tmp_path / "02" / "verdict.json").write_text(wrong, encoding="utf-8")
+        with pytest.raises(RecordingError, match=r"verdict\.json: is no verdict of a run"):
+            twin.read_runs(tmp_path)
     with pytest.raises(RecordingError, match="no run in this folder"):
         twin.read_runs(tmp_path / "absent")

@@ -331,9 +331,10 @@ def test_a_mistake_is_2_in_one_sentence_each(demo: Path, runtime: FakeRuntime, i
     assert (code, out) == (2, "")
     assert err.splitlines() == [
         f"error: {demo}:2: duration: must have a unit of time (s, ms, us, min, h), not '1 kg'",
-        f"error: {demo}:4: unknown key 'enrgy' in checks.0; did you mean 'energy'? Valid: closed_loop, delivered, "
-        "driven_distance, energy, final_pose, localisation_error, map_accuracy, map_coverage, mission_failed, mission_succeeded, no_collision, odometry_drift, "
-        "path_on_circle, recoveries, time_limit, tote_slip",
+        f"error: {demo}:4: unknown key 'enrgy' in checks.0; did you mean 'energy'? "
+        "Valid: always, closed_loop, delivered, driven_distance, energy, eventually, final_pose, finally, "
+        "formula, localisation_error, map_accuracy, map_coverage, mission_failed, mission_succeeded, never, "
+        "no_collision, odometry_drift, path_on_circle, reaches, recoveries, time_limit, tote_slip, until, within",
         "2 problems",
     ]
     assert not runtime.calls

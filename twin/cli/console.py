@@ -88,6 +88,13 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     stdout().print(table)
 
 
+def print_json(content: Any) -> None:
+    """Print JSON for programs."""
+    import json
+
+    sys.stdout.write(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+
+
 def stderr() -> Console:
     """Return the console for errors and progress."""
     from rich.console import Console

@@ -5,7 +5,20 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
+
+import typer
+
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
+]
+Seed = Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", min=1, metavar="N", help="Runs at a time.", show_default="all cores"),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")]
 
 
 def takes(name: str, make: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import GymError
 from twin.geometry import Array
-from twin.sim.photo import opengl
+from twin.sim.photo import Canvas
 
 _SAMPLES = 4
 """Of each pixel; with MuJoCo's shadows and reflections as well, a picture would take ten times as long."""
@@ -65,10 +65,7 @@ class Camera:
             raise GymError(f"a picture of {width} x {height} pixels; valid is 1 or more each way")
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         model.vis.quality.offsamples = _SAMPLES
-        self._model, self._data, self._size = model, mujoco.MjData(model), (height, width)
-        self._opengl = opengl(width, height)
-        self._target = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._target)
+        self._model, self._data, self._canvas = model, mujoco.MjData(model), Canvas(model, width, height)
         self._scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = 0
@@ -96,12 +93,7 @@ class Camera:
         mujoco.mjv_updateScene(model, data, self._options, None, self._view, everything, scene)
         for mark in marks:
             self._draw(mark)
-        self._opengl.make_current()
-        height, width = self._size
-        frame, picture = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
-        mujoco.mjr_render(frame, scene, self._target)
-        mujoco.mjr_readPixels(picture, None, frame, self._target)
-        return np.ascontiguousarray(picture[::-1])
+        return self._canvas.draw(scene)
 
     def _draw(self, mark: Mark) -> None:
         self._add(mujoco.mjtGeom.mjGEOM_CYLINDER, (mark.radius, _FLAT_M, 0.0), mark, _FLAT_M, np.eye(3))
@@ -121,6 +113,4 @@ class Camera:
 
     def close(self) -> None:
         """Free what the graphics driver holds. Harmless when repeated."""
-        self._opengl.make_current()
-        self._target.free()
-        self._opengl.free()
+        self._canvas.close()

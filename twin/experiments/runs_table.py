@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa  # type: ignore[import-untyped]
 
-from twin.errors import RecordingError
-from twin.scenario.verdict import VERDICT
+from twin.scenario.verdict import read_verdict, runs_in
 
+_OF_A_RUN = ("test", "scenario", "seed", "verdict", "error", "digest", "command")
 _OF_A_CHECK = ("passed", "value", "limit", "margin", "at_s", "unit")
 
 
@@ -25,26 +24,17 @@ def runs_table(folder: Path) -> pa.Table:
     Raises:
         RecordingError: There is no run, or a verdict cannot be read.
     """
-    rows = [_row(file, folder) for file in sorted(folder.rglob(VERDICT))]
-    if not rows:
-        raise RecordingError(f"{folder}: no run in this folder; a run's folder holds {VERDICT}")
+    rows = [_row(run, folder) for run in runs_in(folder)]
     names = dict.fromkeys(name for row in rows for name in row)
     return pa.table({name: pa.array([row.get(name) for row in rows], _type(name, rows)) for name in names})
 
 
-def _row(file: Path, folder: Path) -> dict[str, Any]:
-    try:
-        verdict = json.loads(file.read_text(encoding="utf-8"))
-        row = {"run": file.parent.relative_to(folder).as_posix()}
-        row |= {
-            key: verdict.get(key)
-            for key in ("test", "scenario", "seed", "verdict", "error", "digest", "command")
-        }
-        row |= verdict["metrics"]
-        for check in verdict["checks"]:
-            row |= dict(_told(check))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise RecordingError(f"{file}: is no verdict of a run: {fault}") from fault
+def _row(run: Path, folder: Path) -> dict[str, Any]:
+    verdict = read_verdict(run)
+    row = {"run": run.relative_to(folder).as_posix()}
+    row |= {key: verdict.get(key) for key in _OF_A_RUN} | verdict["metrics"]
+    for check in verdict["checks"]:
+        row |= dict(_told(check))
     return row
 
 

@@ -68,7 +68,7 @@ class Trials:
 
     def __enter__(self) -> Self:
         self._processes: Processes[tuple[str, Trial]] = Processes(
-            _perform, self.count, preload=("twin.experiments.trials",)
+            _perform, self.count, preload=(_perform.__module__,)
         )
         return self
 

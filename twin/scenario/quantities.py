@@ -20,3 +20,12 @@ def quantity(value: float | bool | None, unit: str, limit: float | bool | None) 
     if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
         value, unit = value * 1e3, "mm"
     return f"{round(value, 3):.5g} {unit}".rstrip()
+
+
+def seconds(value: float | None, digits: int = 1) -> str:
+    """Return a time with its unit; nothing for None.
+
+    >>> seconds(2.25, 2), seconds(None)
+    ('2.25 s', '')
+    """
+    return "" if value is None else f"{value:.{digits}f} s"

@@ -9,12 +9,16 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from twin.errors import RecordingError
 from twin.files.writing import write_whole
 from twin.scenario.checks import CheckResult
 from twin.scenario.faults import FaultReport
 
 VERDICT = "verdict.json"
 """The file of a run's folder that says how it ended; the last that is written."""
+
+EXIT_CODES = {"pass": 0, "fail": 1, "error": 2, "inconclusive": 3}
+"""Of commands; a single run is never inconclusive."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +60,7 @@ class Verdict:
     @property
     def exit_code(self) -> int:
         """0 for pass, 1 for fail, 2 for error."""
-        return {"pass": 0, "fail": 1, "error": 2}[self.verdict]
+        return EXIT_CODES[self.verdict]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `verdict.json`."""
@@ -75,6 +79,36 @@ class Verdict:
         """
         write_junit(folder / "junit.xml", [self])
         write_whole(folder / VERDICT, self.to_json())
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """Return the folders of runs in a folder, itself included, in the order of their paths.
+
+    Raises:
+        RecordingError: There is none.
+    """
+    found = [file.parent for file in sorted(folder.rglob(VERDICT))]
+    if not found:
+        raise RecordingError(f"{folder}: no run in this folder; a run's folder holds {VERDICT}")
+    return found
+
+
+def read_verdict(folder: Path) -> dict[str, Any]:
+    """Return the content of a run's `verdict.json`.
+
+    Raises:
+        RecordingError: It cannot be read, or is none.
+    """
+    file = folder / VERDICT
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as fault:
+        raise RecordingError(f"{file}: cannot be read: {fault}") from fault
+    match found:
+        case {"scenario": _, "verdict": _, "checks": [*checks], "metrics": {}}:
+            if all(isinstance(check, dict) and "name" in check for check in checks):
+                return found
+    raise RecordingError(f"{file}: is no verdict of a run")
 
 
 def write_junit(file: Path, verdicts: Sequence[Verdict]) -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ctypes.util
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -75,37 +74,47 @@ def take(solids: Sequence[Solid], camera: Camera, width: int = 640, height: int 
     view = mujoco.MjvCamera()
     view.lookat[:] = camera.lookat
     view.distance, view.azimuth, view.elevation = camera.distance, camera.azimuth, camera.elevation
-    picture = np.empty((height, width, 3), dtype=np.uint8)
-    with _opengl(width, height):
-        scene = mujoco.MjvScene(model, len(solids) + 100)
-        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
-        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
-        frame = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(frame, scene, context)
-        mujoco.mjr_readPixels(picture, None, frame, context)
-        context.free()
-    return picture[::-1]
-
-
-@contextmanager
-def _opengl(width: int, height: int) -> Iterator[None]:
-    """Let OpenGL draw in the block; raises SimulationError if there is none."""
-    context = opengl(width, height)
+    scene = mujoco.MjvScene(model, len(solids) + 100)
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    canvas = Canvas(model, width, height)
     try:
-        yield
+        return canvas.draw(scene)
     finally:
-        context.free()
+        canvas.close()
 
 
-def opengl(width: int, height: int) -> Any:
-    """Return what OpenGL draws on, of a size [pixels]: made current, to be freed.
+class Canvas:
+    """What OpenGL draws scenes on, without a display.
 
     `mujoco.Renderer` has the one that was chosen when MuJoCo was imported, which by default wants a display.
-
-    Raises:
-        SimulationError: There is no OpenGL without a display here.
     """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+        """Make one for scenes of a model, of a size [pixels].
+
+        Raises:
+            SimulationError: There is no OpenGL without a display here.
+        """
+        self._opengl, self._frame = _opengl(width, height), mujoco.MjrRect(0, 0, width, height)
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+
+    def draw(self, scene: mujoco.MjvScene) -> NDArray[np.uint8]:
+        """Return a picture, shape (height, width, 3)."""
+        self._opengl.make_current()
+        picture = np.empty((self._frame.height, self._frame.width, 3), np.uint8)
+        mujoco.mjr_render(self._frame, scene, self._context)
+        mujoco.mjr_readPixels(picture, None, self._frame, self._context)
+        return np.ascontiguousarray(picture[::-1])
+
+    def close(self) -> None:
+        """Free what the graphics driver holds. Harmless when repeated."""
+        self._opengl.make_current()
+        self._context.free()
+        self._opengl.free()
+
+
+def _opengl(width: int, height: int) -> Any:
     try:
         context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
         context.make_current()

@@ -59,6 +59,6 @@ def test_shards_have_every_test_once(parts: int) -> None:
 
 @pytest.mark.parametrize("text", ["0/2", "3/2", "1", "a/b", "1/0", "-1/2", "1/2/3"])
 def test_what_is_no_shard(text: str) -> None:
-    with pytest.raises(ScenarioError, match=f"--shard {text}: must be i/n"):
+    with pytest.raises(ScenarioError, match=f"--shard {text}: must be I/N"):
         shard_of(text)
     assert shard_of("2/3") == (2, 3)

@@ -10,12 +10,13 @@ import polars as pl
 import pytest
 
 from tests.experiments.sweep.conftest import LIMIT, SPEED, MakePlan
+from twin.experiments.short_names import short_names
 from twin.experiments.sweep.folder import ResultFolder
 from twin.experiments.sweep.judging import PointJudge
 from twin.experiments.sweep.page import report_page
 from twin.experiments.sweep.plan import Plan
 from twin.experiments.sweep.result import SweepResult
-from twin.experiments.sweep.summary import short_names, summarise
+from twin.experiments.sweep.summary import summarise
 from twin.experiments.sweep.table import make_table, write_parquet
 
 

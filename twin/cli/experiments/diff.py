@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json as json_module
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from twin.cli import completion
+from twin.cli.console import print_json
+from twin.cli.option_groups import AsJson
 
 if TYPE_CHECKING:
     from twin.experiments.diff import Difference
@@ -39,7 +39,7 @@ def diff(
         typer.Option(metavar="KEY=VALUE", help="Change one value of B, which is run now; may be repeated."),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of all noise of B, instead of the file's.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    json: AsJson = False,
 ) -> None:
     """Name the first tick, topic and field in which two runs differ.
 
@@ -61,7 +61,7 @@ def diff(
 def print_difference(found: Difference, *, as_json: bool = False) -> None:
     """Print what a comparison found, for people or programs."""
     if as_json:
-        sys.stdout.write(json_module.dumps(found.to_dict(), indent=2, ensure_ascii=False) + "\n")
+        print_json(found.to_dict())
         return
     from twin.cli.console import stdout
     from twin.cli.experiments.difference_table import difference_report

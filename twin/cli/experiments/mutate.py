@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json as json_module
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from twin.cli import completion
-from twin.cli.console import print_table, stderr, stdout
+from twin.cli.console import print_json, print_table, stderr, stdout
+from twin.cli.option_groups import AsJson, Jobs, Overrides, Seed
 
 if TYPE_CHECKING:
     from twin.experiments.mutants import Report
@@ -27,11 +26,8 @@ def mutate(
             autocompletion=completion.scenarios,
         ),
     ] = None,
-    set: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None,
+    set: Overrides = None,
+    seed: Seed = None,
     mutant: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,11 +39,8 @@ def mutate(
         float,
         typer.Option("--min-score", min=0.0, max=1.0, metavar="SHARE", help="Fail if fewer are caught."),
     ] = 0.0,
-    jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", "-j", min=1, metavar="N", help="Runs at a time.", show_default="all cores"),
-    ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    jobs: Jobs = None,
+    json: AsJson = False,
 ) -> None:
     """Run a scenario with known-bad stacks, and tell which of them its checks catch.
 
@@ -78,7 +71,7 @@ def mutate(
         with Trials(count=jobs or os.cpu_count() or 1, told=told) as trials:
             report = mutated(source, trials, mutant or ())
     if json:
-        sys.stdout.write(json_module.dumps(report.to_dict(), indent=2, ensure_ascii=False) + "\n")
+        print_json(report.to_dict())
     else:
         _print(report)
     raise typer.Exit(int(report.score is not None and report.score < least))

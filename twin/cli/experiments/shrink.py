@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json as json_module
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from twin.cli import completion
-from twin.cli.console import stderr, stdout
+from twin.cli.console import print_json, stderr, stdout
+from twin.cli.option_groups import AsJson, Jobs, Overrides, Seed
 
 if TYPE_CHECKING:
     from twin.experiments.shrink import Shrunk
@@ -27,22 +26,16 @@ def shrink(
             autocompletion=completion.scenarios,
         ),
     ],
-    set: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None,
+    set: Overrides = None,
+    seed: Seed = None,
     output: Annotated[
         Path | None,
         typer.Option(
             "--output", "-o", metavar="FILE", help="The file to write.", show_default="<scenario>_shrunk.yaml"
         ),
     ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", "-j", min=1, metavar="N", help="Runs at a time.", show_default="all cores"),
-    ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    jobs: Jobs = None,
+    json: AsJson = False,
 ) -> None:
     """Reduce a failing scenario to the smallest that fails the same checks, and write it.
 
@@ -73,9 +66,7 @@ def shrink(
     ]
     as_file.write(found.source, file, comments)
     if json:
-        sys.stdout.write(
-            json_module.dumps(_values(found, file, trials.made), indent=2, ensure_ascii=False) + "\n"
-        )
+        print_json(_values(found, file, trials.made))
     else:
         _report(found, file, trials.made)
 

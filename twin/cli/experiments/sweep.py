@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_module
 import os
-import re
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from twin.cli import completion
-from twin.cli.console import stderr, stdout
+from twin.cli.console import print_json, stderr, stdout
 from twin.cli.interrupted import sigterm_is_ctrl_c
-from twin.errors import ScenarioError
+from twin.cli.option_groups import AsJson, Jobs
 
 if TYPE_CHECKING:
     from twin.experiments.sweep.making import Backend
@@ -53,9 +50,7 @@ def sweep(
     confidence: Annotated[
         float | None, typer.Option(help="How sure that judgement is to be.", show_default="0.95")
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", "-j", min=1, help="Runs at a time.", show_default="all cores")
-    ] = None,
+    jobs: Jobs = None,
     shard: Annotated[
         str, typer.Option(metavar="I/N", help="Make the I-th of N shares of the runs, from 1/N to N/N.")
     ] = "1/1",
@@ -83,7 +78,7 @@ def sweep(
         ),
     ] = None,
     page: Annotated[bool, typer.Option(help="Write report.html, too.")] = True,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    json: AsJson = False,
 ) -> None:
     """Run a scenario with many values and seeds, and say how sure its pass rate is.
 
@@ -93,15 +88,16 @@ def sweep(
     Exit code 0: pass; 1: fail; 2: a run could not be made; 3: too few runs to say.
     """
     from twin.cli.experiments.sweep_table import share_report, sweep_report
+    from twin.experiments.suite.selection import shard_of
     from twin.experiments.sweep.axes import parse_axis, parse_seeds
-    from twin.experiments.sweep.judging import exit_code
     from twin.experiments.sweep.plan import make_plan
     from twin.experiments.sweep.summary import summarise
     from twin.experiments.sweep.sweep import sweep as run_sweep
     from twin.files.writing import make_folder
+    from twin.scenario.verdict import EXIT_CODES
 
     sigterm_is_ctrl_c()
-    share = _share(shard)
+    share = shard_of(shard)
     plan = make_plan(
         scenario,
         [parse_axis(word) for word in set or ()],
@@ -132,18 +128,10 @@ def sweep(
         return
     summary = summarise(result)
     if json:
-        sys.stdout.write(json_module.dumps(summary.to_dict(), indent=2) + "\n")
+        print_json(summary.to_dict())
     else:
         stdout().print(sweep_report(result, summary))
-    raise typer.Exit(exit_code(summary.outcome))
-
-
-def _share(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
-    share, shares = (int(found[1]), int(found[2])) if found else (0, 0)
-    if not 1 <= share <= shares:
-        raise ScenarioError(f"--shard {text}: must be I/N, from 1/N to N/N, such as 1/4")
-    return share, shares
+    raise typer.Exit(EXIT_CODES[summary.outcome])
 
 
 def _backend(ray: str | None, jobs: int | None, folder: Path, time_limit: float | None) -> Backend:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from twin.cli.run.verdict_table import STYLE
-from twin.experiments.sweep.summary import short_names
+from twin.experiments.short_names import short_names
 
 if TYPE_CHECKING:
     from rich.console import Group, RenderableType

@@ -13,7 +13,8 @@ from typing import Annotated, Any
 import typer
 
 from twin.cli import completion
-from twin.cli.console import stderr, stdout
+from twin.cli.console import print_json, stderr, stdout
+from twin.cli.option_groups import AsJson
 from twin.cli.run.batch_progress import batch_progress
 from twin.cli.run.folders import results_folder
 from twin.cli.run.options import RunOptions
@@ -84,7 +85,7 @@ def run_batch(
         typer.Option(metavar="DIR", help="Folder of the results.", show_default="runs/test/<time>"),
     ] = None,
     record: Annotated[bool, typer.Option("--record", help="Write Rerun recordings too.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    json: AsJson = False,
     show: Annotated[bool, typer.Option("--list", help="Only print the names of the tests.")] = False,
 ) -> None:
     """Run scenarios as tests, one for each seed and value that they name.
@@ -98,6 +99,7 @@ def run_batch(
     from twin.experiments.suite.selection import selected, shard_of
     from twin.files.writing import check_file, write_whole
     from twin.scenario.junit import junit_xml
+    from twin.scenario.verdict import EXIT_CODES
 
     files = scenario_files(paths or [own_scenarios()])
     cases = selected(cases_in(files), keyword=keyword, tags=tag, shard=shard_of(shard))
@@ -126,10 +128,10 @@ def run_batch(
             if junit is not None:
                 write_whole(junit, junit_xml(verdicts))
     if json:
-        sys.stdout.write(json_module.dumps(verdicts, indent=2) + "\n")
+        print_json(verdicts)
     else:
         stdout().print(many_report(verdicts, folder))
-    raise typer.Exit(max(map(_exit_code, verdicts), default=0))
+    raise typer.Exit(max((EXIT_CODES[verdict["verdict"]] for verdict in verdicts), default=0))
 
 
 def own_scenarios() -> Path:
@@ -163,6 +165,7 @@ def scenario_files(paths: list[Path]) -> list[Path]:
 def run_repeatedly(options: RunOptions) -> int:
     """Run some times in fresh processes, print the digests, and return the exit code."""
     from twin.scenario import schema
+    from twin.scenario.verdict import EXIT_CODES
 
     runs = max(2, options.repeat)  # one run has nothing to be compared with
     name = "" if options.out else schema.load(options.scenario, options.overrides).name
@@ -173,15 +176,11 @@ def run_repeatedly(options: RunOptions) -> int:
             verdicts.append(run_in_child(options, parent / str(number)))
     digests = sorted({verdict["digest"] or "none" for verdict in verdicts})
     if options.json:
-        sys.stdout.write(json_module.dumps({"runs": verdicts, "digests": digests}, indent=2) + "\n")
+        print_json({"runs": verdicts, "digests": digests})
     else:
         _report(verdicts, digests)
     differ = options.expect_one_hash and (len(digests) > 1 or digests == ["none"])
-    return max(*map(_exit_code, verdicts), int(differ))
-
-
-def _exit_code(verdict: Mapping[str, Any]) -> int:
-    return {"pass": 0, "fail": 1, "error": 2}[verdict["verdict"]]
+    return max(*(EXIT_CODES[verdict["verdict"]] for verdict in verdicts), int(differ))
 
 
 def _report(verdicts: list[dict[str, Any]], digests: list[str]) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twin.api.simulation import Simulation
-from twin.cli.console import print_error, stderr, stdout
+from twin.cli.console import print_error, print_json, stderr, stdout
 from twin.cli.interrupted import raise_swallowed, sigterm_is_ctrl_c, was_interrupted
 from twin.cli.run.folders import run_folder
 from twin.cli.run.options import RunOptions
@@ -71,7 +71,7 @@ def run_once(options: RunOptions) -> int:
             difference = compare(golden, of_path(simulation.folder), progress)
     if options.json and difference is not None:
         both = json.loads(verdict.to_json()) | {"golden": difference.to_dict()}
-        sys.stdout.write(json.dumps(both, indent=2, ensure_ascii=False) + "\n")
+        print_json(both)
     elif options.json:
         sys.stdout.write(verdict.to_json())
     elif fault is None:

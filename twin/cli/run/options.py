@@ -12,6 +12,7 @@ import typer
 
 from twin.bridge.wire import Wire
 from twin.cli import completion
+from twin.cli.option_groups import Overrides, Seed
 from twin.errors import ScenarioError
 
 if TYPE_CHECKING:
@@ -34,11 +35,8 @@ class RunOptions:
             autocompletion=completion.scenarios,
         ),
     ]
-    set: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),
-    ] = None
-    seed: Annotated[int | None, typer.Option(help="Seed of all noise, instead of the file's.")] = None
+    set: Overrides = None
+    seed: Seed = None
     params_file: Annotated[
         Path | None,
         _file(help="A Nav2 parameter file for all robots that navigate, instead of the scenario's."),

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from twin.scenario.quantities import quantity
+from twin.scenario.quantities import seconds
+from twin.scenario.verdict_text import numbers_of, reasons
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -29,16 +30,10 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
         table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
-        value, limit = (quantity(check[key], check["unit"], check["limit"]) for key in ("value", "limit"))
-        margin = (
-            quantity(check["margin"], check["unit"], check["limit"]) if check["margin"] is not None else ""
-        )
-        moment = check["at_s"] if check["worst_s"] is None else check["worst_s"]
-        at = "" if moment is None else f"{moment:.2f} s"
-        table.add_row(mark, Text(check["name"]), value, limit, margin, at)
+        table.add_row(mark, Text(check["name"]), *numbers_of(check))
     lines: list[Table | Text] = [table] if verdict["checks"] else []
     lines += [_faults(verdict["faults"])] if verdict["faults"] else []
-    lines += [Text(reason, style="red") for reason in _reasons(verdict)]
+    lines += [Text(reason, style="red") for reason in reasons(verdict)]
     lines.append(_summary(verdict))
     if losses := verdict["metrics"].get("pace_losses"):
         times = "once" if losses == 1 else f"{losses:.0f} times"
@@ -63,7 +58,7 @@ def _faults(faults: Sequence[Mapping[str, Any]]) -> Table:
     table.add_column("effect")
     for fault in faults:
         outcome = Text(fault["outcome"].replace("_", " "), style=_OUTCOME[fault["outcome"]])
-        times = ("" if fault[key] is None else f"{fault[key]:.2f} s" for key in ("at_s", "end_s"))
+        times = (seconds(fault[key], 2) for key in ("at_s", "end_s"))
         table.add_row(outcome, Text(fault["name"]), *times, Text(fault["effect"]))
     return table
 
@@ -85,22 +80,22 @@ def many_report(verdicts: Sequence[Mapping[str, Any]], folder: Path | None = Non
             Text(verdict["verdict"].upper(), style=STYLE[verdict["verdict"]]),
             Text(_name(verdict)),
             str(verdict["seed"]),
-            _seconds(metrics.get("sim_time_s")),
-            _seconds(metrics.get("wall_time_s")),
+            seconds(metrics.get("sim_time_s")),
+            seconds(metrics.get("wall_time_s")),
             (verdict["digest"] or "")[:12],
         )
-    reasons = []
+    said = []
     for verdict in verdicts:
-        reasons += [Text(f"{_name(verdict)}: {reason}", style="red") for reason in _reasons(verdict)]
+        said += [Text(f"{_name(verdict)}: {reason}", style="red") for reason in reasons(verdict)]
         if verdict["verdict"] != "pass" and verdict["command"]:
-            reasons.append(Text(f"  run it again: {verdict['command']}", style="dim"))
+            said.append(Text(f"  run it again: {verdict['command']}", style="dim"))
         for fault in verdict["faults"]:
             if fault["outcome"] != "landed":
                 what = f"{_name(verdict)}: the fault {fault['name']} {_told(fault)}"
-                reasons.append(Text(what, style=_OUTCOME[fault["outcome"]]))
+                said.append(Text(what, style=_OUTCOME[fault["outcome"]]))
     passed = sum(verdict["verdict"] == "pass" for verdict in verdicts)
     style = STYLE["pass" if passed == len(verdicts) else "fail"]
-    lines = [*reasons, Text(f"{passed} of {len(verdicts)} passed", style=style)]
+    lines = [*said, Text(f"{passed} of {len(verdicts)} passed", style=style)]
     if folder is not None:
         lines.append(Text(f"written to {folder}; `twin report {folder}` makes a page of it", style="dim"))
     return Group(table, *lines)
@@ -112,12 +107,6 @@ def _told(fault: Mapping[str, Any]) -> str:
 
 def _name(verdict: Mapping[str, Any]) -> str:
     return str(verdict["test"] or verdict["scenario"])
-
-
-def _reasons(verdict: Mapping[str, Any]) -> list[str]:
-    if verdict["error"] is not None:
-        return [str(verdict["error"])]
-    return [f"{check['name']}: {check['reason']}" for check in verdict["checks"] if not check["passed"]]
 
 
 def _summary(verdict: Mapping[str, Any]) -> Text:
@@ -138,7 +127,3 @@ def _summary(verdict: Mapping[str, Any]) -> Text:
     if not verdict["deterministic"]:
         text.append("  not deterministic", style="not bold yellow")
     return text
-
-
-def _seconds(value: float | None) -> str:
-    return "" if value is None else f"{value:.1f} s"

@@ -1,101 +1,64 @@
-"""Pictures of a run as SVG that takes its colours from the page, so that they suit light, dark and paper."""
+"""Pictures of a run."""
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Iterator
-from contextlib import contextmanager
-from html import escape
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from twin.experiments.report.figures import ROLES, WIDTH, figure, svg
 from twin.experiments.report.told import Moment, Series, Told
 from twin.geometry import Array, matrix_from_quat_wxyz
 from twin.models.shapes import Box, Cylinder, Sphere
 
-_ROLES = {
-    "ink": "#010101",
-    "muted": "#020202",
-    "line": "#030303",
-    "paper": "#040404",
-    "truth": "#050505",
-    "belief": "#060606",
-    "odometry": "#070707",
-    "plan": "#080808",
-    "bad": "#090909",
-    "wall": "#0a0a0a",
-    "solid": "#0b0b0b",
-    **{f"state{i}": f"#0c0c{i:02x}" for i in range(8)},
-}
-"""Colours of the page by name -> colours that stand for them until the SVG is in the page."""
 _POINTS = 1200
 """Of a line; more cannot be seen, and make the file large."""
 _GAP_S = 0.5
 """A line is broken where nothing came for so long, and for ten times what is usual [s]."""
-_WIDTH = 7.2
-"""Of a picture [inches]: an A4 page without its margins."""
 _WALL_FROM, _WALL_TO = 0.05, 0.6
 """Solids between these heights are in the way of a robot, and drawn from above [m]."""
 
 
-def trajectory(told: Told, moments: list[Moment]) -> str:
-    """Return the floor from above: map or solids, plans, where robots were and believed to be, as SVG."""
-    with _figure((_WIDTH, 5.2)) as figure:
-        axes = figure.add_subplot()
+_TRAILS: tuple[tuple[str, str, str, Any], ...] = (
+    ("odometry", "odometry", "odometry alone", (0, (1, 1.2))),
+    ("estimate", "belief", "belief", "-"),
+)
+"""Kind of a trail, its colour, its name, how its line is drawn."""
+
+
+def trajectory(told: Told, moments: list[Moment], size: tuple[float, float] = (WIDTH, 5.2)) -> str:
+    """Return the floor from above: map or solids, plans, where robots were and believed to be, as SVG.
+
+    Args:
+        told: The run.
+        moments: That are marked, by their numbers.
+        size: Of the picture [inches].
+    """
+    with figure(size) as drawn:
+        axes = drawn.add_subplot()
         axes.set_aspect("equal", adjustable="datalim")
         _floor(axes, told)
         for number, plan in enumerate(told.plans[-30:]):
             label = "plan" if number == 0 else None
-            axes.plot(*plan.T, color=_ROLES["plan"], lw=1.1, ls=(0, (4, 2)), label=label, zorder=3)
+            axes.plot(*plan.T, color=ROLES["plan"], lw=1.1, ls=(0, (4, 2)), label=label, zorder=3)
         several = len(told.robots) > 1
         for robot in told.robots:
             name = f" {robot}" if several else ""
             _, truth = told.truth(robot)
             axes.plot(
-                *_thinned(truth).T, color=_ROLES["truth"], lw=3.2, alpha=0.75, label=f"truth{name}", zorder=4
+                *_thinned(truth).T, color=ROLES["truth"], lw=3.2, alpha=0.75, label=f"truth{name}", zorder=4
             )
-            for kind, role, text in (
-                ("odometry", "odometry", "odometry alone"),
-                ("estimate", "belief", "belief"),
-            ):
-                line = told.trail(robot, kind)
+            for kind, role, text, style in _TRAILS:
+                line = _thinned(told.trail(robot, kind))
                 if len(line):
-                    style: Any = "-" if role == "belief" else (0, (1, 1.2))
-                    axes.plot(
-                        *_thinned(line).T,
-                        color=_ROLES[role],
-                        lw=1.3,
-                        ls=style,
-                        label=f"{text}{name}",
-                        zorder=5,
-                    )
-            if len(truth):
-                axes.plot(
-                    *truth[0],
-                    "o",
-                    color=_ROLES["ink"],
-                    ms=7,
-                    mfc=_ROLES["paper"],
-                    mew=1.6,
-                    zorder=6,
-                    label=None if several else "start",
-                )
-                axes.plot(
-                    *truth[-1],
-                    "s",
-                    color=_ROLES["ink"],
-                    ms=7,
-                    mfc=_ROLES["paper"],
-                    mew=1.6,
-                    zorder=6,
-                    label=None if several else "end",
-                )
+                    axes.plot(*line.T, color=ROLES[role], lw=1.3, ls=style, label=f"{text}{name}", zorder=5)
+            ink: dict[str, Any] = {"color": ROLES["ink"], "mfc": ROLES["paper"], "ms": 7, "mew": 1.6}
+            for point, mark, text in ((truth[:1], "o", "start"), (truth[-1:], "s", "end")):
+                if len(point):
+                    axes.plot(*point.T, mark, **ink, zorder=6, label=None if several else text)
         for number, moment in enumerate(moments, 1):
             for robot in told.robots[:1]:
                 times, truth = told.truth(robot)
@@ -104,9 +67,9 @@ def trajectory(told: Told, moments: list[Moment]) -> str:
                     _mark(axes, at, number, moment)
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
-        axes.grid(visible=True, color=_ROLES["line"], lw=0.5, zorder=0)
+        axes.grid(visible=True, color=ROLES["line"], lw=0.5, zorder=0)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=6, frameon=False, fontsize=8.5)
-        return _svg(figure, f"The floor from above, with the paths of {', '.join(told.robots) or 'nobody'}")
+        return svg(drawn, f"The floor from above, with the paths of {', '.join(told.robots) or 'nobody'}")
 
 
 def time_series(told: Told, moments: list[Moment]) -> str:
@@ -115,17 +78,17 @@ def time_series(told: Told, moments: list[Moment]) -> str:
     rows = ([0.45] if told.states else []) + [1.0] * len(panels)
     if not rows:
         return ""
-    with _figure((_WIDTH, 0.6 + 1.35 * sum(rows))) as figure:
-        grid = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=rows)[:, 0]
+    with figure((WIDTH, 0.6 + 1.35 * sum(rows))) as drawn:
+        grid = drawn.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=rows)[:, 0]
         if told.states:
             _timeline(grid[0], told)
         for axes, (title, lines) in zip(grid[1 if told.states else 0 :], panels, strict=True):
             for name, role, series in lines:
                 times, values = _thinned_series(series)
-                axes.plot(times, values, color=_ROLES[role], lw=1.1, label=name)
+                axes.plot(times, values, color=ROLES[role], lw=1.1, label=name)
             is_full = len(lines) > 3  # then the names have a line of their own, below the title
-            axes.set_title(title, loc="left", fontsize=9, color=_ROLES["ink"], pad=18 if is_full else None)
-            axes.grid(visible=True, color=_ROLES["line"], lw=0.5)
+            axes.set_title(title, loc="left", fontsize=9, color=ROLES["ink"], pad=18 if is_full else None)
+            axes.grid(visible=True, color=ROLES["line"], lw=0.5)
             if len(lines) > 1:
                 corner = ("lower left", (0.0, 0.98)) if is_full else ("lower right", (1.0, 0.98))
                 axes.legend(
@@ -141,7 +104,7 @@ def time_series(told: Told, moments: list[Moment]) -> str:
         for number, moment in enumerate(moments, 1):
             role = "bad" if moment.bad else "muted"
             for axes in grid:
-                axes.axvline(moment.time_s, color=_ROLES[role], lw=0.8, ls=":")
+                axes.axvline(moment.time_s, color=ROLES[role], lw=0.8, ls=":")
             grid[0].annotate(
                 str(number),
                 (moment.time_s, 1.0),
@@ -150,12 +113,12 @@ def time_series(told: Told, moments: list[Moment]) -> str:
                 textcoords="offset points",
                 ha="center",
                 fontsize=8,
-                color=_ROLES[role],
+                color=ROLES[role],
                 annotation_clip=False,
             )
         grid[-1].set_xlim(0.0, max(told.end_s, 1e-3))
         grid[-1].set_xlabel("simulated time [s]")
-        return _svg(figure, "States of the mission, speeds and errors over time")
+        return svg(drawn, "States of the mission, speeds and errors over time")
 
 
 def _panels(told: Told) -> Iterator[tuple[str, list[tuple[str, str, Series]]]]:
@@ -192,9 +155,9 @@ def _timeline(axes: Axes, told: Told) -> None:
             end - start,
             left=start,
             height=1.0,
-            color=_ROLES[role],
+            color=ROLES[role],
             alpha=0.45,
-            edgecolor=_ROLES["paper"],
+            edgecolor=ROLES["paper"],
             lw=0.8,
         )
         fits = int(105 * (end - start) / width)
@@ -207,13 +170,13 @@ def _timeline(axes: Axes, told: Told) -> None:
                 ha="center",
                 va="center",
                 fontsize=8,
-                color=_ROLES["ink"],
+                color=ROLES["ink"],
                 clip_on=True,
             )
     axes.set_ylim(-0.5, 0.5)
     axes.set_yticks([])
     axes.tick_params(bottom=False)
-    axes.set_title("mission", loc="left", fontsize=9, color=_ROLES["ink"], pad=14)
+    axes.set_title("mission", loc="left", fontsize=9, color=ROLES["ink"], pad=14)
     for side in ("top", "right", "left", "bottom"):
         axes.spines[side].set_visible(False)
 
@@ -251,8 +214,8 @@ def _floor(axes: Axes, told: Told) -> None:
                 Polygon(
                     _hull(points[:, :2]),
                     closed=True,
-                    fc=_ROLES["solid"],
-                    ec=_ROLES["wall"],
+                    fc=ROLES["solid"],
+                    ec=ROLES["wall"],
                     lw=0.5,
                     alpha=0.5,
                     zorder=1,
@@ -267,7 +230,7 @@ def _hull(points: Array) -> Array:
 
 
 def _mark(axes: Axes, at: Array, number: int, moment: Moment) -> None:
-    colour = _ROLES["bad" if moment.bad else "ink"]
+    colour = ROLES["bad" if moment.bad else "ink"]
     axes.annotate(
         str(number),
         (at[0], at[1]),
@@ -278,49 +241,9 @@ def _mark(axes: Axes, at: Array, number: int, moment: Moment) -> None:
         fontsize=8.5,
         zorder=8,
         color=colour,
-        bbox={"boxstyle": "circle,pad=0.25", "fc": _ROLES["paper"], "ec": colour, "lw": 1.1},
+        bbox={"boxstyle": "circle,pad=0.25", "fc": ROLES["paper"], "ec": colour, "lw": 1.1},
         arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
     )
-
-
-@contextmanager
-def _figure(size: tuple[float, float]) -> Iterator[Figure]:
-    """Yield an empty figure whose text and lines have the colours of the page."""
-    look: dict[Any, Any] = {
-        "svg.fonttype": "none",
-        "svg.hashsalt": "twin",
-        "font.family": "sans-serif",
-        "font.size": 8.5,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.axisbelow": True,
-        "axes.labelcolor": _ROLES["ink"],
-        "axes.edgecolor": _ROLES["muted"],
-        "text.color": _ROLES["ink"],
-        "xtick.color": _ROLES["muted"],
-        "ytick.color": _ROLES["muted"],
-    }
-    with mpl.rc_context(look):
-        yield Figure(figsize=size, layout="constrained")
-
-
-def _svg(figure: Figure, label: str) -> str:
-    """Return a figure as an element of a page."""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    for role, colour in _ROLES.items():
-        text = text.replace(colour, f"var(--{role})")
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'font: ([\d.]+)px [^;"]*', r"font-size: \1px", text)
-    used = set(re.findall(r"#([\w.-]+)", text))
-    text = re.sub(r' id="([\w.-]+)"', lambda name: name[0] if name[1] in used else "", text)
-    box = re.search(r'viewBox="[^"]*"', text)
-    assert box is not None
-    inside = text[text.index(">") + 1 :]
-    names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
-    return f'<svg {names} class="drawing" role="img" aria-label="{escape(label)}" {box[0]}>{inside}'
 
 
 def _thinned(line: Array) -> Array:

@@ -6,22 +6,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
 from twin.errors import RecordingError, SimulationError
-from twin.experiments.report.told import Moment, Told, read_run, runs_in
+from twin.experiments.report.html import badge, cell, page, table
+from twin.experiments.report.told import Moment, Told, read_run
 from twin.files.writing import check_file, write_whole
-from twin.scenario.quantities import quantity
-from twin.scenario.verdict import VERDICT
+from twin.scenario.quantities import seconds
+from twin.scenario.verdict import VERDICT, runs_in
+from twin.scenario.verdict_text import numbers_of, reasons
 
-_TEMPLATE = Path(__file__).with_name("page.html")
-_WORDS = {"pass": "PASS", "fail": "FAIL", "error": "ERROR"}
 _MOST_PHOTOS, _MOST_LINES = 6, 200
 _MOST_SHOWN = 8
 """Of many runs, those that are shown with pictures."""
-_NUMBERS = frozenset({"value", "limit", "margin", "at", "seed", "simulated", "took", "from", "to", "lasts"})
-"""Columns that stand right."""
 _APART_S = 1.0
 """Moments that are nearer to each other are shown in one picture [s]."""
 
@@ -37,13 +34,12 @@ def write_report(folder: Path, file: Path) -> int:
     check_file(file)
     if (folder / VERDICT).is_file():
         told = read_run(folder)
-        page, count = _page(f"{told.title}: {_WORDS[told.word]}", run_section(told, whole=True)), 1
+        title, body, count = f"{told.title}: {told.word.upper()}", run_section(told, whole=True), 1
     else:
-        runs = list(runs_in(folder))
-        if not runs:
-            raise RecordingError(f"{folder}: no run in this folder; a run's folder holds {VERDICT}")
-        page, count = _page(f"{len(runs)} runs in {folder.name}", many_section(folder, runs)), len(runs)
-    write_whole(file, page)
+        runs = runs_in(folder)
+        title, body, count = f"{len(runs)} runs in {folder.name}", many_section(folder, runs), len(runs)
+    made = datetime.now().strftime("%Y-%m-%d %H:%M")
+    write_whole(file, page(title, body, f"Written by <code>twin report</code>, {made}."))
     return count
 
 
@@ -60,12 +56,12 @@ def many_section(folder: Path, runs: Sequence[Path]) -> str:
         if count[word]
     )
     words = ", ".join(f"{count[word]} {word}" for word in ("pass", "fail", "error") if count[word])
-    head = f"<h1>{_badge(worst)}{len(told)} runs</h1><p>{words}; in <code>{escape(str(folder))}</code></p>"
+    head = f"<h1>{badge(worst)}{len(told)} runs</h1><p>{words}; in <code>{escape(str(folder))}</code></p>"
     parts = [head, f'<div class="bar" role="img" aria-label="{words}">{bar}</div>']
     shown = [i for i in sorted_ if told[i].word != "pass"][:_MOST_SHOWN]
     rows = [_row_of_run(told[i], f"#run-{i + 1}" if i in shown else "") for i in sorted_]
     parts.append(
-        _table("All runs, failures first", ["", "run", "seed", "simulated", "took", "what happened"], rows)
+        table("All runs, failures first", ["", "run", "seed", "simulated", "took", "what happened"], rows)
     )
     parts += [
         f'<section class="run" id="run-{i + 1}">{run_section(told[i], whole=False)}</section>' for i in shown
@@ -85,11 +81,11 @@ def run_section(told: Told, *, whole: bool) -> str:
     """
     level, below = ("h1", "h2") if whole else ("h2", "h3")
     verdict, metrics = told.verdict, told.verdict["metrics"]
-    parts = [f"<{level}>{_badge(told.word)}{escape(told.title)}</{level}>"]
+    parts = [f"<{level}>{badge(told.word)}{escape(told.title)}</{level}>"]
     facts = [
         ("seed", str(verdict["seed"])),
-        ("simulated", _seconds(metrics.get("sim_time_s"))),
-        ("took", _seconds(metrics.get("wall_time_s"))),
+        ("simulated", seconds(metrics.get("sim_time_s"))),
+        ("took", seconds(metrics.get("wall_time_s"))),
         ("finished", told.written),
     ]
     parts.append(
@@ -136,12 +132,12 @@ def _pictures(told: Told, level: str) -> list[str]:
                 "",
                 f"<td class=number>{s.start_s:.2f} s</td>",
                 f"<td class=number>{s.end_s - s.start_s:.2f} s</td>",
-                _cell(s.name),
+                cell(s.name),
             ]
             for s in told.states
         ]
-        table = _table("States of the mission", ["from", "lasts", "state"], rows)
-        parts += [f"<{level}>Mission</{level}>", table]
+        parts.append(f"<{level}>Mission</{level}>")
+        parts.append(table("States of the mission", ["from", "lasts", "state"], rows))
     if told.log:
         parts.append(_log(told))
     return parts
@@ -182,39 +178,33 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for check in checks:
         mark = ("pass", "✓ holds") if check["passed"] else ("fail", "✗ fails")
+        value, limit, margin, at = numbers_of(check)
+        numbers = [value, limit, margin, at] if has_margin else [value, limit, at]
         cells = [
             f'<td class="mark {mark[0]}">{mark[1]}</td>',
             f'<th scope="row">{escape(check["name"])}</th>',
-            *(
-                f"<td class=number>{escape(quantity(check[key], check['unit'], check['limit']))}</td>"
-                for key in ("value", "limit")
-            ),
+            *(f"<td class=number>{escape(number)}</td>" for number in numbers),
+            cell(check["reason"]),
         ]
-        if has_margin:
-            margin = check.get("margin")
-            text = "" if margin is None else quantity(margin, check["unit"], check["limit"])
-            cells.append(f"<td class=number>{escape(text)}</td>")
-        at = check["at_s"] if check.get("worst_s") is None else check["worst_s"]
-        cells += [f"<td class=number>{'' if at is None else f'{at:.2f} s'}</td>", _cell(check["reason"])]
         rows.append(["" if check["passed"] else "bad", *cells])
     heads = ["", "check", "value", "limit", *(["margin"] if has_margin else []), "at", "why"]
-    return _table("Every check must hold for the run to pass", heads, rows)
+    return table("Every check must hold for the run to pass", heads, rows)
 
 
 def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for fault in faults:
         landed = fault["outcome"] == "landed"
-        times = ("" if fault[key] is None else f"{fault[key]:.2f} s" for key in ("at_s", "end_s"))
+        times = (seconds(fault[key], 2) for key in ("at_s", "end_s"))
         cells = [
             f'<td class="mark {"pass" if landed else "fail"}">{fault["outcome"].replace("_", " ")}</td>',
             f'<th scope="row">{escape(fault["name"])}</th>',
             *(f"<td class=number>{time}</td>" for time in times),
-            _cell(fault["effect"]),
+            cell(fault["effect"]),
         ]
         rows.append(["", *cells])
     heads = ["", "fault", "from", "to", "effect"]
-    return _table("What was let go wrong, and what came of it where it acted", heads, rows)
+    return table("What was let go wrong, and what came of it where it acted", heads, rows)
 
 
 def _again(verdict: Mapping[str, Any]) -> str:
@@ -236,7 +226,7 @@ def _made_with(verdict: Mapping[str, Any]) -> str:
     )
     if not verdict["deterministic"]:
         says = "Other processes could change this run: its digest need not come again."
-    return "<h2>Made with</h2>" + _table(says, ["what", "which"], cells)
+    return "<h2>Made with</h2>" + table(says, ["what", "which"], cells)
 
 
 def _moments(told: Told, moments: Iterable[Moment]) -> str:
@@ -249,11 +239,11 @@ def _moments(told: Told, moments: Iterable[Moment]) -> str:
                 f'<td class="{colour}"><span class="number-mark">{number}</span></td>',
                 f"<td class=number>{moment.time_s:.2f} s</td>",
                 f'<th scope="row">{escape(moment.title)}</th>',
-                _cell(moment.text),
-                _cell(told.state_at(moment.time_s)),
+                cell(moment.text),
+                cell(told.state_at(moment.time_s)),
             ]
         )
-    return _table("", ["", "at", "what", "why", "mission"], rows)
+    return table("", ["", "at", "what", "why", "mission"], rows)
 
 
 def _log(told: Told) -> str:
@@ -263,62 +253,28 @@ def _log(told: Told) -> str:
             "",
             f"<td class=number>{line.time_s:.2f} s</td>",
             f'<td class="{classes.get(line.level, "quiet")}">{line.level}</td>',
-            _cell(line.text),
+            cell(line.text),
         ]
         for line in told.log[:_MOST_LINES]
     ]
     more = len(told.log) - len(rows)
     caption = f"and {more} lines more, in the recording" if more > 0 else ""
-    table = _table(caption, ["at", "level", "text"], rows)
-    return f"<details><summary>{len(told.log)} lines of the nodes</summary>{table}</details>"
+    lines = table(caption, ["at", "level", "text"], rows)
+    return f"<details><summary>{len(told.log)} lines of the nodes</summary>{lines}</details>"
 
 
 def _row_of_run(told: Told, link: str) -> list[str]:
     verdict, metrics = told.verdict, told.verdict["metrics"]
-    reasons = [f"{c['name']}: {c['reason']}" for c in verdict["checks"] if not c["passed"]]
-    reason = str(verdict["error"] or "; ".join(reasons)).partition("\n")[0]
+    reason = "; ".join(reasons(verdict)).partition("\n")[0]
     title = escape(told.title)
     if link:
         title = f'<a href="{link}">{title}</a>'
     return [
         "" if told.word == "pass" else "bad",
-        f'<td class="mark {told.word}">{_WORDS[told.word]}</td>',
+        f'<td class="mark {told.word}">{told.word.upper()}</td>',
         f'<th scope="row">{title}</th>',
         f"<td class=number>{verdict['seed']}</td>",
-        f"<td class=number>{_seconds(metrics.get('sim_time_s'))}</td>",
-        f"<td class=number>{_seconds(metrics.get('wall_time_s'))}</td>",
-        _cell(reason),
+        f"<td class=number>{seconds(metrics.get('sim_time_s'))}</td>",
+        f"<td class=number>{seconds(metrics.get('wall_time_s'))}</td>",
+        cell(reason),
     ]
-
-
-def _table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; the first item of each row is the class of the row, the others are its cells."""
-    columns = "".join(
-        f'<th scope="col"{" class=number" if head in _NUMBERS else ""}>{escape(head)}</th>' for head in heads
-    )
-    body = "".join(
-        f'<tr class="{kind}">{"".join(cells)}</tr>' if kind else f"<tr>{''.join(cells)}</tr>"
-        for kind, *cells in rows
-    )
-    said = f"<caption>{escape(caption)}</caption>" if caption else ""
-    table = f"<table>{said}<thead><tr>{columns}</tr></thead><tbody>{body}</tbody></table>"
-    return f'<div class="scroll">{table}</div>'
-
-
-def _cell(text: object) -> str:
-    return f"<td>{escape(str(text))}</td>"
-
-
-def _badge(word: str) -> str:
-    return f'<span class="badge {word}">{_WORDS[word]}</span>'
-
-
-def _seconds(value: float | None) -> str:
-    return "" if value is None else f"{value:.1f} s"
-
-
-def _page(title: str, body: str) -> str:
-    made = datetime.now().strftime("%Y-%m-%d %H:%M")
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        title=escape(title), body=body, made=made
-    )

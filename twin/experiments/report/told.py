@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -18,7 +17,8 @@ from twin.geometry import Array
 from twin.recording.read_back import Recording, read
 from twin.recording.scene import RecordedScene
 from twin.scenario.quantities import quantity
-from twin.scenario.verdict import VERDICT
+from twin.scenario.verdict import VERDICT, read_verdict
+from twin.scenario.verdict_text import moment_of
 
 _BAD = ("WARN", "ERROR", "CRITICAL")
 _MOST_MOMENTS = 6
@@ -200,7 +200,7 @@ class Told:
         """What is worth a look, in the order of time: what failed, what came near to it, warnings."""
         found = []
         for check in self.verdict["checks"]:
-            at = check["at_s"] if check.get("worst_s") is None else check["worst_s"]
+            at = moment_of(check)
             if at is None or (
                 check["passed"] and (at > self.end_s - _END_S or not _is_measured(check["value"]))
             ):
@@ -254,12 +254,7 @@ def read_run(folder: Path) -> Told:
     Raises:
         RecordingError: It holds no verdict, or one that cannot be read.
     """
-    try:
-        verdict = json.loads((folder / VERDICT).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as fault:
-        raise RecordingError(f"{folder / VERDICT}: cannot be read: {fault}") from fault
-    if not isinstance(verdict, dict) or not {"scenario", "verdict", "checks", "metrics"} <= set(verdict):
-        raise RecordingError(f"{folder / VERDICT}: is no verdict of a run")
+    verdict = read_verdict(folder)
     files = sorted(folder.glob("*.rrd"))
     if not files:
         return Told(folder=folder, verdict=verdict, recording=None, missing="The run was not recorded.")
@@ -267,12 +262,6 @@ def read_run(folder: Path) -> Told:
         return Told(folder=folder, verdict=verdict, recording=read(files[0]))
     except RecordingError as fault:
         return Told(folder=folder, verdict=verdict, recording=None, missing=f"{fault}.")
-
-
-def runs_in(folder: Path) -> Iterator[Path]:
-    """Yield the folders of runs in a folder, itself included, in the order of their names."""
-    for file in sorted(folder.rglob(VERDICT)):
-        yield file.parent
 
 
 def _seconds(times_ns: NDArray[np.int64]) -> Array:

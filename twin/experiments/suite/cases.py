@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from twin.errors import Problem, ScenarioError, TwinError
+from twin.experiments.short_names import short_names
 from twin.scenario.command import twin_run
 from twin.strict_yaml.document import as_text, read
 
@@ -78,7 +79,7 @@ def cases_of(file: Path) -> list[Case]:
 
     config = schema.load(file).test
     _check(file, config.grid)
-    short = _short_names(tuple(config.grid))
+    short = short_names(list(config.grid), with_word=False)
     points = product(
         *([(key, i, value) for i, value in enumerate(values)] for key, values in config.grid.items())
     )
@@ -121,23 +122,6 @@ def _check(file: Path, grid: Mapping[str, Sequence[Any]]) -> None:
                 problems += [Problem(f"test.grid: {each.message}", file, line) for each in wrong.problems]
     if problems:
         raise ScenarioError(problems)
-
-
-def _short_names(keys: tuple[str, ...]) -> dict[str, str]:
-    """Return for each key its last words, as few as tell it from the others."""
-
-    def tail(key: str, count: int) -> str:
-        return ".".join(key.split(".")[-count:])
-
-    found = {}
-    for key in keys:
-        count = 1
-        while tail(key, count).isdecimal() or any(
-            tail(key, count) == tail(other, count) for other in keys if other != key
-        ):
-            count += 1
-        found[key] = tail(key, count)
-    return found
 
 
 def _named(value: Any, index: int) -> str:

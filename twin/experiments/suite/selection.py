@@ -41,10 +41,10 @@ def selected(
 
 
 def shard_of(text: str) -> tuple[int, int]:
-    """Return which part of how many `i/n` means; raises ScenarioError."""
+    """Return which part of how many `I/N` means; raises ScenarioError."""
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise ScenarioError(f"--shard {text}: must be i/n, from 1/n to n/n, such as 1/3")
+        raise ScenarioError(f"--shard {text}: must be I/N, from 1/N to N/N, such as 1/4")
     return int(match[1]), int(match[2])
 
 

@@ -13,7 +13,6 @@ from twin.experiments.sequential import bounds, clopper_pearson, judge
 from twin.scenario.pass_rate import PassRate
 
 Outcome = Literal["pass", "fail", "error", "inconclusive"]
-_EXIT_CODES = {"pass": 0, "fail": 1, "error": 2, "inconclusive": 3}
 _GRAVEST: tuple[Outcome, ...] = ("error", "fail", "inconclusive")
 _CONFIDENCE = 0.95
 """Of an interval where nothing else is asked for."""
@@ -84,8 +83,3 @@ def outcome_of(points: Iterable[PointJudge]) -> Outcome:
     """Return what is said of the sweep: the gravest of what is said of its points."""
     found = {point.outcome for point in points}
     return next((each for each in _GRAVEST if each in found), "pass")
-
-
-def exit_code(outcome: Outcome) -> int:
-    """Return 0 for pass, 1 for fail, 2 for error, 3 for inconclusive."""
-    return _EXIT_CODES[outcome]

@@ -6,7 +6,8 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,45 +36,51 @@ class Job:
 
 
 def perform(job: Job) -> dict[str, Any]:
-    """Run, put the run's folder in its place, and return its verdict as it stands there.
+    """Run, put the run's folder in its place, and return its verdict.
 
     Raises:
         RecordingError: The folder cannot be written; no run is to blame.
+    """
+    with appearing(job) as made:
+        return _written(_verdict(job, made), made)
+
+
+@contextmanager
+def appearing(job: Job) -> Iterator[Path]:
+    """Yield a folder that is the run's afterwards, with all that was written into it.
+
+    If somebody else was faster, that folder stays; it gets a recording that it lacks.
+
+    Raises:
+        RecordingError: It cannot be written.
     """
     made = None
     try:
         job.workshop.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(prefix=f"{job.folder.name}-", dir=job.workshop))
-        text = _verdict(job, made).to_json()
-        put(made, text, job.folder)
+        yield made
+        made.chmod(0o755)
+        if job.folder.is_dir():
+            for recording in made.glob("*.rrd"):
+                recording.replace(job.folder / recording.name)
+            return
+        try:
+            made.rename(job.folder)
+        except OSError:
+            if not job.folder.is_dir():
+                raise
     except OSError as fault:
         raise RecordingError(f"{job.folder.parent}: cannot be written: {fault.strerror}") from None
     finally:
         if made is not None:
             shutil.rmtree(made, ignore_errors=True)
-    verdict: dict[str, Any] = json.loads(text)
-    return verdict
 
 
-def put(made: Path, verdict: str, folder: Path) -> None:
-    """Write the verdict into a folder that is made, and let that appear; if somebody else was faster, not.
-
-    A recording of a run that is there already is put beside its verdict.
-
-    Raises:
-        OSError: It cannot be written.
-    """
-    if folder.is_dir():
-        for recording in made.glob("*.rrd"):
-            recording.replace(folder / recording.name)
-        return
-    (made / VERDICT).write_text(verdict, encoding="utf-8")
-    made.chmod(0o755)
-    try:
-        made.rename(folder)
-    except OSError:
-        if not folder.is_dir():
-            raise
+def _written(verdict: Verdict, folder: Path) -> dict[str, Any]:
+    text = verdict.to_json()
+    (folder / VERDICT).write_text(text, encoding="utf-8")
+    content: dict[str, Any] = json.loads(text)
+    return content
 
 
 def _verdict(job: Job, made: Path) -> Verdict:
@@ -89,17 +96,17 @@ def _verdict(job: Job, made: Path) -> Verdict:
         reason = str(fault)
     except Exception as fault:  # a bug, ours or of a user's node: the other runs go on
         reason = f"{type(fault).__name__}: {fault}"
-    return Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason)
+    return _broken(job, reason)
 
 
 def lost(job: Job, reason: str) -> dict[str, Any]:
-    """Put the folder of a run that gave no result, and return its verdict."""
-    verdict = Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason).to_json()
-    job.workshop.mkdir(parents=True, exist_ok=True)
-    made = Path(tempfile.mkdtemp(dir=job.workshop))
-    put(made, verdict, job.folder)
-    result: dict[str, Any] = json.loads(verdict)
-    return result
+    """Put the folder of a run that gave no result, and return its verdict; raises RecordingError."""
+    with appearing(job) as made:
+        return _written(_broken(job, reason), made)
+
+
+def _broken(job: Job, reason: str) -> Verdict:
+    return Verdict(scenario=job.name, seed=int(job.overrides["seed"]), error=reason)
 
 
 def carried(job: Job) -> dict[str, bytes]:

@@ -2,65 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from html import escape
 from importlib.metadata import version
 from itertools import islice
-from typing import Any
 
-from twin.errors import RecordingError
+from twin.experiments.report.drawing import trajectory
+from twin.experiments.report.html import badge, cell, page, table
+from twin.experiments.report.told import read_run
+from twin.experiments.short_names import short_names
 from twin.experiments.sweep.plan import PlannedRun
-from twin.experiments.sweep.plots import paths, plots
+from twin.experiments.sweep.plots import plots
 from twin.experiments.sweep.result import SweepResult
-from twin.experiments.sweep.summary import PointSummary, SweepSummary, command, short_names
+from twin.experiments.sweep.summary import PointSummary, SweepSummary, command
+from twin.scenario.verdict_text import reasons
 
 _MOST_POINTS, _MOST_FAILURES = 500, 40
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1c1c1c; margin: 2rem auto }
-body { max-width: 72rem; padding: 0 1.5rem }
-h1 { font-size: 1.6rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2.2rem 0 .6rem }
-.outcome { display: inline-block; color: white; border-radius: .3rem; padding: .1rem .7rem; font-weight: 600 }
-.pass { background: #2a9d5c } .fail { background: #c8372d } .error { background: #8a3ffc }
-.inconclusive { background: #b58105 }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums } .wide { overflow-x: auto }
-th, td { padding: .25rem .8rem; border-bottom: 1px solid #e4e4e4; text-align: right; white-space: nowrap }
-th { font-weight: 600; color: #555 } td.text, th.text { text-align: left; white-space: normal }
-td.few { text-align: left; color: #c8372d }
-.bar { display: inline-block; width: 7rem; height: .7rem; background: #eee; position: relative }
-.bar i { position: absolute; top: 0; bottom: 0; background: #9cb8d3 }
-.bar b { position: absolute; top: -.15rem; bottom: -.15rem; width: 3px; background: #1f4e79 }
-.bar s { position: absolute; top: -.25rem; bottom: -.25rem; width: 1px; background: #c8372d }
-code { background: #f4f4f4; padding: .1rem .35rem; border-radius: .2rem; font-size: .85rem; user-select: all }
-svg { max-width: 100%; height: auto }
-figure { margin: 0; display: inline-block; width: 22rem; vertical-align: top }
-figure { margin-bottom: 1.5rem }
-figcaption { font-size: .85rem; color: #555 } .dim { color: #777 }
-"""
 
 
 def report_page(result: SweepResult, summary: SweepSummary) -> str:
     """Return the page of a sweep whose runs are all there: HTML with everything in it."""
     parts = [
-        "<!doctype html>",
-        f'<html lang="en"><head><meta charset="utf-8"><title>{escape(summary.scenario)}: sweep</title>',
-        '<meta name="viewport" content="width=device-width">',
-        f"<style>{_STYLE}</style></head><body>",
         *_head(result, summary),
         *_points(summary),
         *_plots(result),
         *_failures(result),
         *_made(result),
-        "</body></html>",
     ]
-    return "\n".join(parts) + "\n"
-
-
-def _outcome(outcome: str) -> str:
-    return f'<span class="outcome {outcome}">{outcome.upper()}</span>'
+    footer = f"Written by <code>twin sweep</code> of twin {escape(version('twin'))}."
+    return page(f"{summary.scenario}: sweep", "\n".join(parts), footer)
 
 
 def _head(result: SweepResult, summary: SweepSummary) -> Iterable[str]:
-    yield f"<h1>{escape(summary.scenario)} {_outcome(summary.outcome)}</h1>"
+    yield f"<h1>{badge(summary.outcome)}{escape(summary.scenario)}</h1>"
     passed = sum(point.passed for point in summary.points)
     said = f"{passed} of {summary.runs} runs passed"
     if summary.claim:
@@ -79,42 +53,42 @@ def _points(summary: SweepSummary) -> Iterable[str]:
     keys = list(points[0].values)
     checks = list(dict.fromkeys(name for point in points for name in point.medians))
     sure = summary.claim["confidence"] if summary.claim else 0.95
-    yield "<h2>Pass rates</h2><div class=wide><table><tr><th></th>"
-    yield from (f"<th title='{escape(key)}'>{escape(name)}</th>" for key, name in short_names(keys).items())
-    yield f"<th>runs</th><th>passed</th><th></th><th>{100 * sure:g} % interval</th>"
-    yield "<th class=text>failed</th>"
-    yield from (f"<th>{escape(name)}</th>" for name in checks)
-    yield "</tr>"
+    rows = []
     for point in points:
-        yield f"<tr><td class=text>{_outcome(point.outcome)}</td>"
-        yield from (f"<td>{escape(value)}</td>" for value in point.values.values())
-        rate = f"{100 * point.passed / point.runs:.4g} %"
-        yield f"<td>{point.runs}</td><td>{rate}</td><td>{_bar(point, summary)}</td>"
-        yield f"<td>{100 * point.least:.1f} to {100 * point.most:.1f} %</td>"
+        numbers = [*map(escape, point.values.values()), str(point.runs)]
+        numbers.append(f"{100 * point.passed / point.runs:.4g} %")
         failures = "<br>".join(escape(f"{name} {count}") for name, count in point.failures.items())
-        yield f"<td class=few>{failures}</td>"
-        yield from (f"<td>{_number(point.medians.get(name))}</td>" for name in checks)
-        yield "</tr>"
-    yield "</table></div>"
+        cells = [
+            f"<td>{badge(point.outcome)}</td>",
+            *map(_number, numbers),
+            f"<td>{_bar(point, summary)}</td>",
+        ]
+        cells.append(_number(f"{100 * point.least:.1f} to {100 * point.most:.1f} %"))
+        cells.append(f"<td class=fail>{failures}</td>")
+        cells += [_number(f"{point.medians[n]:.4g}" if n in point.medians else "-") for n in checks]
+        rows.append(["", *cells])
     what = "bounds of the pass rate that hold at any time, each" if summary.claim else "Clopper-Pearson,"
     medians = " Columns with names of checks: medians of what they measured." if checks else ""
-    yield f"<p class=dim>Interval: {what} at {100 * sure:g} %.{medians}</p>"
+    says = f"Interval: {what} at {100 * sure:g} %.{medians}"
+    heads = ["", *short_names(keys).values(), "runs", "passed", "", f"{100 * sure:g} % interval", "failed"]
+    yield "<h2>Pass rates</h2>"
+    yield table(says, [*heads, *checks], rows, right={*heads[1:-1], *checks})
     if len(summary.points) > len(points):
         shown = f"The first {len(points)} of {len(summary.points)} points"
-        yield f"<p class=dim>{shown}; all are in summary.json.</p>"
+        yield f"<p class=quiet>{shown}; all are in summary.json.</p>"
+
+
+def _number(text: str) -> str:
+    return f"<td class=number>{text}</td>"
 
 
 def _bar(point: PointSummary, summary: SweepSummary) -> str:
     rate = point.passed / point.runs
     inside = f"<i style='left:{100 * point.least:.1f}%;right:{100 - 100 * point.most:.1f}%'></i>"
-    inside += f"<b style='left:calc({100 * rate:.1f}% - 1px)'></b>"
+    inside += f"<b style='left:{100 * rate:.1f}%'></b>"
     if summary.claim:
         inside += f"<s style='left:{100 * summary.claim['min']:.1f}%'></s>"
-    return f"<span class=bar>{inside}</span>"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
+    return f"<span class=rate>{inside}</span>"
 
 
 def _plots(result: SweepResult) -> Iterable[str]:
@@ -129,41 +103,34 @@ def _failures(result: SweepResult) -> Iterable[str]:
         return
     yield "<h2>Runs that did not pass</h2>"
     yield from _pictures(result, [run for run, _ in shown])
-    yield "<div class=wide><table><tr><th class=text>why</th><th class=text>again</th></tr>"
-    for run, verdict in shown[:_MOST_FAILURES]:
-        again = escape(command(result.plan, run))
-        yield f"<tr><td class=text>{escape(_why(verdict))}</td><td class=text><code>{again}</code></td></tr>"
-    yield "</table></div>"
+    rows = [
+        ["", cell("; ".join(reasons(verdict))), f"<td><code>{escape(command(result.plan, run))}</code></td>"]
+        for run, verdict in shown[:_MOST_FAILURES]
+    ]
+    yield table("", ["why", "again"], rows)
     if len(shown) > _MOST_FAILURES:
-        yield f"<p class=dim>The first {_MOST_FAILURES}; all are in results.parquet.</p>"
-
-
-def _why(verdict: Mapping[str, Any]) -> str:
-    if verdict["error"] is not None:
-        return str(verdict["error"])
-    failed = (check for check in verdict["checks"] if not check["passed"])
-    return "; ".join(f"{check['name']}: {check['reason']}" for check in failed)
+        yield f"<p class=quiet>The first {_MOST_FAILURES}; all are in results.parquet.</p>"
 
 
 def _pictures(result: SweepResult, runs: Iterable[PlannedRun]) -> Iterable[str]:
+    yield "<div class=paths>"
     for run in runs:
         recording = result.folder.recording(run)
-        if recording is None:
-            continue
-        try:
-            svg = paths(recording)
-        except RecordingError:
-            continue  # it is there for people; the run's verdict stands
-        if svg is not None:
-            values = ", ".join(f"{key}={value}" for key, value in result.plan.points[run.point].items())
-            where = f"twin play {recording.relative_to(result.folder.path)}"
-            caption = f"{values}{', ' if values else ''}seed {run.seed}<br>"
-            yield f"<figure>{svg}<figcaption>{caption}<code>{escape(where)}</code></figcaption></figure>"
+        told = None if recording is None else read_run(recording.parent)
+        if recording is None or told is None or not told.robots:
+            continue  # a recording is for people; the run's verdict stands without
+        values = ", ".join(f"{key}={value}" for key, value in result.plan.points[run.point].items())
+        where = f"twin play {recording.relative_to(result.folder.path)}"
+        caption = escape(f"{values}{', ' if values else ''}seed {run.seed}")
+        yield f"<figure>{trajectory(told, told.moments, (4.8, 3.8))}"
+        yield f"<figcaption>{caption}<br><code>{escape(where)}</code></figcaption></figure>"
+    yield "</div>"
 
 
 def _made(result: SweepResult) -> Iterable[str]:
     plan = result.plan
-    yield f"<h2>How it was made</h2><p class=dim>twin {escape(version('twin'))}, {escape(plan.file.name)}; "
+    yield f"<h2>How it was made</h2><p class=quiet>twin {escape(version('twin'))}, {escape(plan.file.name)}; "
     seeds = f"{len(plan.seeds)} seeds: {plan.seeds[0]} to {plan.seeds[-1]}"
-    yield f"{len(plan.points)} points, each with up to {seeds}. "
+    varied = f"over {', '.join(escape(axis.key) for axis in plan.axes)}, " if plan.axes else ""
+    yield f"{len(plan.points)} points, {varied}each with up to {seeds}. "
     yield "The table of all runs is results.parquet, what they cost is in costs.parquet beside this page.</p>"

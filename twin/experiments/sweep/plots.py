@@ -1,26 +1,25 @@
-"""Pictures of a sweep, as SVG: pass rates and measured values over what was varied, paths of failing runs."""
+"""Pictures of a sweep, as SVG: pass rates and measured values over what was varied."""
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
 
+from twin.experiments.report.figures import ROLES, WIDTH, figure, svg
 from twin.experiments.sequential import clopper_pearson
-from twin.experiments.sweep.summary import short_names
+from twin.experiments.short_names import short_names
 from twin.experiments.sweep.table import Column, Table
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-_GOOD, _BAD, _ODD, _LIMIT = "#2a9d5c", "#c8372d", "#8a3ffc", "#444444"
-_COLOURS = {"pass": _GOOD, "fail": _BAD, "error": _ODD}
-_WIDTH, _HEIGHT = 4.6, 2.4
+_GOOD, _BAD, _ODD = "#2a9d5c", "#c8372d", "#8a3ffc"
+"""Of what is drawn as pixels."""
+_COLOURS = {"pass": (ROLES["good"], _GOOD), "fail": (ROLES["bad"], _BAD), "error": (ROLES["odd"], _ODD)}
+_HEIGHT = 2.4
 """Of a plot [inch]."""
 _BINS = 10
 """A sampled interval's pass rates are those of so many parts of it."""
@@ -31,26 +30,17 @@ _TICKS = 7
 """Fewer values are named on their axis."""
 
 
-def _figure(columns: int, rows: int, height: float = _HEIGHT) -> tuple[Figure, list[Axes]]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(_WIDTH * columns, height * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
-    for ax in axes.flat:
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.grid(color="#e6e6e6", linewidth=0.7)
-        ax.set_axisbelow(True)
-    return figure, list(axes.flat)
-
-
-def _svg(figure: Figure, salt: str) -> str:
-    """Return a figure as SVG to stand in a page, the same for the same figure."""
-    import matplotlib
-
-    stream = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": salt, "svg.fonttype": "none"}):
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-    return re.sub(r"^.*?(?=<svg)", "", stream.getvalue(), flags=re.DOTALL)
+@contextmanager
+def _axes(columns: int, count: int, height: float = _HEIGHT) -> Iterator[tuple[Figure, list[Axes]]]:
+    """Yield a figure and so many axes, in rows."""
+    rows = -(-count // columns)
+    with figure((WIDTH, height * rows)) as drawn:
+        axes = list(drawn.subplots(rows, columns, squeeze=False).flat)
+        for ax in axes:
+            ax.grid(color=ROLES["line"], linewidth=0.7)
+        for ax in axes[count:]:
+            ax.set_visible(False)
+        yield drawn, axes
 
 
 def plots(table: Table, keys: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -68,14 +58,14 @@ def plots(table: Table, keys: Sequence[str]) -> Iterator[tuple[str, str]]:
     for key in varied:
         column = table.columns[key]
         label = names[key] + (f" [{column.unit}]" if column.unit else "")
-        yield f"over {key}", _svg(_over(table, column, label, checks), key)
+        yield f"over {key}", _over(table, column, label, checks)
     if len(varied) >= 2:
         first, second = varied[:2]
         if all(len(set(table[key])) <= 40 for key in (first, second)):
             drawn = _both(table, (first, second), (names[first], names[second]))
-            yield f"pass rate over {first} and {second}", _svg(drawn, "both")
+            yield f"pass rate over {first} and {second}", drawn
     if not varied and checks:
-        yield "what was measured", _svg(_histograms(table, checks), "histograms")
+        yield "what was measured", _histograms(table, checks)
 
 
 def _places(column: Column) -> tuple[np.ndarray[Any, Any], list[str] | None]:
@@ -86,33 +76,27 @@ def _places(column: Column) -> tuple[np.ndarray[Any, Any], list[str] | None]:
     return np.array([names.index(str(value)) for value in column.values], dtype=float), names
 
 
-def _over(table: Table, column: Column, label: str, checks: Sequence[str]) -> Figure:
+def _over(table: Table, column: Column, label: str, checks: Sequence[str]) -> str:
     """Draw the pass rate and what each check measured over one parameter."""
-    count = 1 + len(checks)
-    columns = min(count, 2)
-    figure, axes = _figure(columns, -(-count // columns))
     places, names = _places(column)
     verdicts = np.array(table["verdict"])
-    for ax in axes:
-        ax.set_xlabel(label)
-        if names is not None:
-            ax.set_xticks(range(len(names)), names, rotation=20 if len(names) > 4 else 0)
-        elif len(np.unique(places)) <= _TICKS:
-            ax.set_xticks(np.unique(places), [f"{place:g}" for place in np.unique(places)])
-    _rates(axes[0], places, verdicts == "pass")
-    for ax, name in zip(axes[1:], checks, strict=False):
-        values = _numbers(table[f"check.{name}"])
-        for verdict, colour in _COLOURS.items():
-            chosen = verdicts == verdict
+    with _axes(2 if checks else 1, 1 + len(checks)) as (drawn, axes):
+        for ax in axes:
+            ax.set_xlabel(label)
+            if names is not None:
+                ax.set_xticks(range(len(names)), names, rotation=20 if len(names) > 4 else 0)
+            elif len(np.unique(places)) <= _TICKS:
+                ax.set_xticks(np.unique(places), [f"{place:g}" for place in np.unique(places)])
+        _rates(axes[0], places, verdicts == "pass")
+        for ax, name in zip(axes[1:], checks, strict=False):
+            values = _numbers(table[f"check.{name}"])
             raster = len(values) > _MANY
-            ax.scatter(
-                places[chosen], values[chosen], s=9, color=colour, alpha=0.6, linewidths=0, rasterized=raster
-            )
-        _measured(ax, table, name, ax.axhline)
-        ax.set_ylabel(_title(table, name))
-    for ax in axes[count:]:
-        ax.set_visible(False)
-    return figure
+            for verdict, colours in _COLOURS.items():
+                x, y = places[verdicts == verdict], values[verdicts == verdict]
+                ax.scatter(x, y, s=9, color=colours[raster], alpha=0.6, linewidths=0, rasterized=raster)
+            _measured(ax, table, name, ax.axhline)
+            ax.set_ylabel(_title(table, name))
+        return svg(drawn, f"Pass rate and what was measured over {label}")
 
 
 def _rates(ax: Axes, places: np.ndarray[Any, Any], passed: np.ndarray[Any, Any]) -> None:
@@ -133,7 +117,7 @@ def _rates(ax: Axes, places: np.ndarray[Any, Any], passed: np.ndarray[Any, Any])
         100 * rates,
         100 * errors,
         fmt="o-",
-        color="#1f4e79",
+        color=ROLES["plan"],
         capsize=3,
         markersize=4,
     )
@@ -141,44 +125,41 @@ def _rates(ax: Axes, places: np.ndarray[Any, Any], passed: np.ndarray[Any, Any])
     ax.set_ylabel("pass rate [%]")
 
 
-def _both(table: Table, keys: tuple[str, str], names: tuple[str, str]) -> Figure:
+def _both(table: Table, keys: tuple[str, str], names: tuple[str, str]) -> str:
     """Draw the pass rate over two parameters as coloured fields."""
-    from matplotlib.colors import LinearSegmentedColormap
-
     colours = LinearSegmentedColormap.from_list("rates", [_BAD, "#f3ead2", _GOOD])
-    figure, (ax,) = _figure(1, 1, 3.2)
     texts = [list(dict.fromkeys(table[key])) for key in keys]
     total = np.zeros((len(texts[1]), len(texts[0])))
     good = np.zeros_like(total)
     for x, y, verdict in zip(table[keys[0]], table[keys[1]], table["verdict"], strict=True):
         total[texts[1].index(y), texts[0].index(x)] += 1
         good[texts[1].index(y), texts[0].index(x)] += verdict == "pass"
-    with np.errstate(invalid="ignore"):
-        image = ax.imshow(100 * good / total, cmap=colours, vmin=0, vmax=100, origin="lower", aspect="auto")
-    for axis, name, values in zip((ax.xaxis, ax.yaxis), names, texts, strict=True):
-        axis.set_ticks(range(len(values)), [f"{v:g}" if isinstance(v, float) else str(v) for v in values])
-        axis.set_label_text(name)
-    ax.grid(visible=False)
-    figure.colorbar(image, label="pass rate [%]")
-    return figure
+    with _axes(1, 1, 3.2) as (drawn, (ax,)):
+        with np.errstate(invalid="ignore"):
+            image = ax.imshow(
+                100 * good / total, cmap=colours, vmin=0, vmax=100, origin="lower", aspect="auto"
+            )
+        for axis, name, values in zip((ax.xaxis, ax.yaxis), names, texts, strict=True):
+            axis.set_ticks(range(len(values)), [f"{v:g}" if isinstance(v, float) else str(v) for v in values])
+            axis.set_label_text(name)
+        ax.grid(visible=False)
+        drawn.colorbar(image, label="pass rate [%]")
+        return svg(drawn, f"Pass rate over {names[0]} and {names[1]}")
 
 
-def _histograms(table: Table, checks: Sequence[str]) -> Figure:
-    columns = min(len(checks), 2)
-    figure, axes = _figure(columns, -(-len(checks) // columns))
+def _histograms(table: Table, checks: Sequence[str]) -> str:
     verdicts = np.array(table["verdict"])
-    for ax, name in zip(axes, checks, strict=False):
-        values = _numbers(table[f"check.{name}"])
-        there = ~np.isnan(values)
-        edges = np.histogram_bin_edges(values[there], bins=min(30, max(5, int(there.sum() ** 0.5) * 2)))
-        parts = {verdict: values[there & (verdicts == verdict)] for verdict in _COLOURS}
-        ax.hist(list(parts.values()), bins=list(edges), stacked=True, color=list(_COLOURS.values()))
-        _measured(ax, table, name, ax.axvline)
-        ax.set_xlabel(_title(table, name))
-        ax.set_ylabel("runs")
-    for ax in axes[len(checks) :]:
-        ax.set_visible(False)
-    return figure
+    with _axes(min(len(checks), 2), len(checks)) as (drawn, axes):
+        for ax, name in zip(axes, checks, strict=False):
+            values = _numbers(table[f"check.{name}"])
+            there = ~np.isnan(values)
+            edges = np.histogram_bin_edges(values[there], bins=min(30, max(5, int(there.sum() ** 0.5) * 2)))
+            parts = [values[there & (verdicts == verdict)] for verdict in _COLOURS]
+            ax.hist(parts, bins=list(edges), stacked=True, color=[role for role, _ in _COLOURS.values()])
+            _measured(ax, table, name, ax.axvline)
+            ax.set_xlabel(_title(table, name))
+            ax.set_ylabel("runs")
+        return svg(drawn, "What was measured")
 
 
 def _measured(ax: Axes, table: Table, name: str, line: Any) -> None:
@@ -189,7 +170,7 @@ def _measured(ax: Axes, table: Table, name: str, line: Any) -> None:
         return
     reach = max(np.nanmax(np.abs(values)), 1e-12)
     if abs(limit) <= 4.0 * reach:
-        line(limit, color=_LIMIT, linestyle="--", linewidth=1.0)
+        line(limit, color=ROLES["muted"], linestyle="--", linewidth=1.0)
 
 
 def _title(table: Table, name: str) -> str:
@@ -199,38 +180,3 @@ def _title(table: Table, name: str) -> str:
 
 def _numbers(values: Sequence[Any]) -> np.ndarray[Any, Any]:
     return np.array([np.nan if value is None else float(value) for value in values])
-
-
-def paths(recording: Path) -> str | None:
-    """Return the ways of the robots of a recording as SVG, in `map`; None if it has none.
-
-    Raises:
-        RecordingError: It cannot be read.
-    """
-    from twin.recording.read_back import read
-
-    columns = read(recording).columns
-    figure, (ax,) = _figure(1, 1, 3.6)
-    drawn = False
-    for kind, style in (("truth", "-"), ("estimate", "--")):
-        for entity in sorted(columns):
-            found = re.fullmatch(rf"/trails/(\w+)/{kind}", entity)
-            strips = columns[entity].get("LineStrips3D:strips") if found else None
-            if found is None or strips is None:
-                continue
-            points = np.array([point[:2] for row in strips.values for strip in row for point in strip])
-            if len(points) == 0:
-                continue
-            colour = "#1f4e79" if kind == "truth" else "#e08e1b"
-            ax.plot(*points.T, style, color=colour, linewidth=1.2, label=f"{found[1]}, {kind}")
-            if kind == "truth":
-                ax.plot(*points[0], "o", color=_GOOD, markersize=6)
-                ax.plot(*points[-1], "X", color=_BAD, markersize=7)
-            drawn = True
-    if not drawn:
-        return None
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("x [m]")
-    ax.set_ylabel("y [m]")
-    ax.legend(fontsize=8, frameon=False)
-    return _svg(figure, str(recording.parent.name))

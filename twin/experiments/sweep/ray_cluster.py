@@ -9,17 +9,14 @@ import atexit
 import json
 import logging
 import os
-import shutil
 import socket
 import sys
-import tempfile
 import time
-from pathlib import Path
 from typing import Any
 
-from twin.errors import RecordingError, SimulationError
+from twin.errors import SimulationError
 from twin.experiments.processes import Lost
-from twin.experiments.sweep.one_run import Job, carried, put
+from twin.experiments.sweep.one_run import Job, appearing, carried
 from twin.scenario.verdict import VERDICT
 
 _ASKED_S = 5.0
@@ -149,16 +146,8 @@ def _leave() -> None:
 
 
 def _written(job: Job, files: dict[str, bytes]) -> dict[str, Any]:
-    try:
-        job.workshop.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(dir=job.workshop))
-        try:
-            for name, content in files.items():
-                (made / name).write_bytes(content)
-            put(made, files[VERDICT].decode(), job.folder)
-        finally:
-            shutil.rmtree(made, ignore_errors=True)
-    except OSError as fault:
-        raise RecordingError(f"{job.folder.parent}: cannot be written: {fault.strerror}") from None
+    with appearing(job) as made:
+        for name, content in files.items():
+            (made / name).write_bytes(content)
     verdict: dict[str, Any] = json.loads(files[VERDICT])
     return verdict

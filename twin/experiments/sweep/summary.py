@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-import shlex
 import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from twin.experiments.sweep.judging import Outcome
 from twin.experiments.sweep.plan import Plan, PlannedRun
 from twin.experiments.sweep.result import SweepResult
 from twin.plain_text import escaped
+from twin.scenario.command import twin_run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,21 +108,7 @@ def summarise(result: SweepResult) -> SweepSummary:
 def command(plan: Plan, run: PlannedRun) -> str:
     """Return the command line that makes one run again."""
     file = os.path.relpath(plan.file)
-    words = ["twin", "run", str(plan.file) if file.startswith("..") else file]
-    for key, value in plan.points[run.point].items():
-        words += ["--set", f"{key}={value}"]
-    return escaped(shlex.join([*words, "--seed", str(run.seed)]))
-
-
-def short_names(keys: Sequence[str]) -> dict[str, str]:
-    """Return the shortest ends of dotted keys that differ from each other and begin with a word."""
-    names = {}
-    for key in keys:
-        parts = key.split(".")
-        ends = [".".join(parts[-count:]) for count in range(1, len(parts) + 1)]
-        alone = (end for end in ends if sum(f".{other}".endswith(f".{end}") for other in keys) == 1)
-        names[key] = next((end for end in alone if not end[0].isdecimal()), key)
-    return names
+    return escaped(twin_run(plan.file if file.startswith("..") else file, plan.overrides(run)))
 
 
 def _medians(verdicts: Sequence[Mapping[str, Any]]) -> dict[str, float]:
@@ -142,9 +127,3 @@ def _failures(verdicts: Sequence[Mapping[str, Any]]) -> dict[str, int]:
             found[str(verdict["error"]).partition("\n")[0]] += 1
         found.update(check["name"] for check in verdict["checks"] if not check["passed"])
     return dict(found.most_common())
-
-
-def relative(path: Path) -> str:
-    """Return a path as seen from here, if it lies below."""
-    found = os.path.relpath(path)
-    return str(path) if found.startswith("..") else found
