@@ -11,10 +11,10 @@ import pytest
 SCENARIO = """\
 name: spurt
 seed: 1
-duration: 1.2 s
+duration: 0.4 s
 robots: [{model: diff_bot}]
 mission: {type: velocity_profile, robot: diff_bot, steps: [{duration: 5 s, linear: 0.2 m/s}]}
-checks: [{driven_distance: {min: 0.1 m}}]
+checks: [{driven_distance: {min: 2 cm}}]
 """
 
 

@@ -11,11 +11,11 @@ import pytest
 SCENARIO = """\
 name: spurt
 seed: 1
-duration: 1.2 s
+duration: 0.6 s
 robots: [{model: diff_bot, command_latency: 20 ms}]
 mission: {type: velocity_profile, robot: diff_bot, steps: [{duration: 5 s, linear: 0.2 m/s}]}
-faults: [{odometry_jump: {at: 0.3 s, distance: 20 cm}}]
-checks: [{driven_distance: {min: 0.1 m}}, {odometry_drift: {max: 1 cm}}]
+faults: [{odometry_jump: {at: 0.2 s, distance: 20 cm}}]
+checks: [{driven_distance: {min: 5 cm}}, {odometry_drift: {max: 1 cm}}]
 """
 
 
@@ -28,7 +28,7 @@ def spurt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_smallest_scenario_is_written_and_told(spurt: Path, invoke: Any) -> None:
-    code, out, _ = invoke("shrink", "spurt.yaml", "--set", "description=x", "-j", "2")
+    code, out, _ = invoke("shrink", "spurt.yaml", "--set", "description=x", "-j", "1")
     assert code == 0
     words = " ".join(out.split())
     assert "left faults.0 odometry_jump" in words
@@ -37,9 +37,9 @@ def test_the_smallest_scenario_is_written_and_told(spurt: Path, invoke: Any) -> 
     assert text.startswith(
         "# Shrunk from spurt.yaml: the smallest that still fails odometry_drift.\n# Its reason: "
     )
-    assert "- odometry_jump: {at: 0.3 s, distance: 20 cm}\n" in text
+    assert "- odometry_jump: {at: 0.2 s, distance: 20 cm}\n" in text
 
-    code, out, _ = invoke("shrink", "spurt_shrunk.yaml", "-o", "again.yaml", "--json", "-j", "2")
+    code, out, _ = invoke("shrink", "spurt_shrunk.yaml", "-o", "again.yaml", "--json", "-j", "1")
     values = json.loads(out)
     assert (code, values["removed"], values["left"]) == (0, [], ["faults.0 odometry_jump"])
     assert Path("again.yaml").read_text("utf-8").splitlines()[2:] == text.splitlines()[2:]
@@ -50,7 +50,6 @@ def test_the_smallest_scenario_is_written_and_told(spurt: Path, invoke: Any) -> 
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (["spurt.yaml", "--set", "faults=[]"], "spurt passes all its checks: there is no failure to shrink"),
         (["spurt.yaml", "--set", "faults.0.odometry_jump.distance=x"], "must be a number"),
         (["spurt.yaml", "-o", "."], "--output .: cannot be written: it is a folder; name a file"),
         (["nothing"], "no scenario 'nothing'"),

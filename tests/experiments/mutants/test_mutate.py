@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.experiments.conftest import Here
 from twin.errors import PluginError, ScenarioError
 from twin.experiments.mutants import MUTANTS, Mutant, Outcome, Report, Site, mutate
 from twin.experiments.mutants.trial import MutantTrial
-from twin.experiments.trials import Trial, Trials
+from twin.experiments.trials import Trial
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import load
 from twin.warehouse.pick_and_place import PickAndPlaceNode
@@ -27,13 +27,6 @@ checks:
   - driven_distance: {min: 0.2 m, max: 0.3 m}
   - odometry_drift: {max: 1 cm}
 """
-
-
-class Here(Trials):
-    """Runs in this process."""
-
-    def verdicts(self, trials: Sequence[Trial]) -> list[Mapping[str, Any]]:
-        return [trial.perform() for trial in trials]
 
 
 @pytest.fixture
