@@ -116,7 +116,7 @@ def test_a_run_that_others_may_join(tmp_path: Path) -> None:
             code, errors = _interrupt(process, 0.4 + number * 0.25)
         assert (code, "Traceback" in errors, "Error" in errors) == (130, False, False), (number, errors)
         left = sorted(file.name for file in out.iterdir()) if out.exists() else []
-        assert left in ([], ["junit.xml", "verdict.json"]), number
+        assert left in ([], ["hashes.json", "junit.xml", "verdict.json"]), number
         if left:
             assert json.loads((out / "verdict.json").read_text("utf-8"))["error"] == "interrupted"
 
