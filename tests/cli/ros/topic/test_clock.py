@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import pytest
 
@@ -17,30 +18,34 @@ def number(line: str) -> float:
 
 @pytest.mark.parametrize(
     ("options", "low", "high"),
-    [(["-s"], 80.0, 120.0), (["-s", "--wall-time"], 10.0, 60.0), ([], 10.0, 60.0)],
+    [(["-s"], 0.02, 0.5), (["-s", "--wall-time"], 1.0, math.inf), ([], 1.0, math.inf)],
 )
 def test_the_rate_is_that_of_the_clock_asked_for(
     endpoint: str, options: list[str], low: float, high: float
 ) -> None:
-    """100 Hz of simulated time, which is half as fast as the wall clock."""
+    """One message in 10 s of simulated time, fifty in a second: a busy machine does not make them alike."""
     with started(endpoint, "topic", "hz", "/chatter", *options) as process:
         assert low < number(lines(process, 3)[2]) < high
 
 
 def test_the_delay_is_that_of_simulated_time(endpoint: str) -> None:
+    """The stamps are 1000 s old in simulated time, and decades old by the wall clock."""
     with started(endpoint, "topic", "delay", "/point", "-s") as process:
-        assert 0.25 < number(lines(process, 1)[0]) < 0.5
+        assert 500.0 < number(lines(process, 1)[0]) < 100_000.0
 
 
 def test_the_rates_of_several_topics_are_a_table(endpoint: str) -> None:
     with started(endpoint, "topic", "hz", "/chatter", "/point", "--filter", "True", "-s") as process:
         head = lines(process, 2)
-        names, rule, *rows = lines(process, 5)
+        rows: list[str] = []
+        while len(rows) < 2:  # a topic is in the table as soon as it was heard twice
+            names, rule = lines(process, 2)
+            rows = list(itertools.takewhile(bool, (lines(process, 1)[0] for _ in range(3))))
     assert head == ["Subscribed to [/chatter]", "Subscribed to [/point]"]
     assert names.split() == ["topic", "rate", "min_delta", "max_delta", "std_dev", "window"]
     assert set(rule) == {"="}
-    assert [row.split()[0] for row in rows[:2]] == ["/chatter", "/point"]
-    assert all(80.0 < float(row.split()[1]) < 120.0 for row in rows[:2])
+    assert [row.split()[0] for row in rows] == ["/chatter", "/point"]
+    assert all(0.02 < float(row.split()[1]) < 0.5 for row in rows)
 
 
 def test_echo_tells_how_many_messages_were_lost(endpoint: str) -> None:
@@ -62,12 +67,9 @@ def test_drop_leaves_out_x_of_y(endpoint: str) -> None:
 
 
 def test_throttle_by_bytes(endpoint: str) -> None:
-    """At least 12 bytes each, 100 a second of simulated time: of 160 bytes in a second 13 messages pass."""
-    arguments = ("topic", "throttle", "bytes", "/chatter", "160", "1.0", "/thin", "-s")
-    with started(endpoint, *arguments) as process:
+    """One in 200 s of simulated time, in which twenty come; a clock seen late moves the bound by some."""
+    with started(endpoint, "topic", "throttle", "bytes", "/chatter", "1", "200.0", "/thin", "-s") as process:
         assert lines(process, 1) == ["/chatter -> /thin"]
         with started(endpoint, "topic", "echo", "/thin", "--csv") as echo:
-            numbers = [int(line.strip("'")) for line in lines(echo, 25)]
-    in_a_second = [sum(first <= number < first + 90 for number in numbers) for first in numbers]
-    assert max(in_a_second) <= 14
-    assert numbers[-1] - numbers[0] > 100  # of 100 in a second
+            ticks = [int(line.strip("'")) for line in lines(echo, 4)]
+    assert ticks[-1] - ticks[0] > 10

@@ -54,7 +54,7 @@ def hz(
             process.live.spin_once()
             for rate in rates.values():
                 if (report := rate.report()) is not None:
-                    typer.echo(_spread_text("average rate", _rate(report), report))
+                    typer.echo(spread_text("average rate", rate_hz(report), report))
 
 
 @joins
@@ -71,7 +71,7 @@ def bw(topic: TopicName, window: Window = 100, *, joining: Joining) -> None:
             process, name, lambda sample, _: statistics.add(process.now_ns, len(sample.payload)), decode=False
         )
         typer.echo(f"Subscribed to [{name}]")
-        _every_second(process, lambda: _bandwidth_text(statistics.report(process.now_ns)))
+        _every_second(process, lambda: bandwidth_text(statistics.report(process.now_ns)))
 
 
 @joins
@@ -99,7 +99,7 @@ def delay(topic: TopicName, window: Window = 10_000, *, joining: Joining) -> Non
             spread = statistics.report()
             if spread is None:
                 return "" if statistics.is_empty else "no new messages"
-            return _spread_text("average delay", spread.mean * 1e-9, spread)
+            return spread_text("average delay", spread.mean * 1e-9, spread)
 
         _every_second(process, report)
 
@@ -145,11 +145,13 @@ def _every_second(process: TopicProcess, report: Callable[[], str]) -> None:
     process.live.spin()
 
 
-def _rate(spread: Spread) -> float:
+def rate_hz(spread: Spread) -> float:
+    """Return how often something comes whose gaps [ns] these are."""
     return 1e9 / spread.mean if spread.mean > 0 else 0.0
 
 
-def _spread_text(title: str, value: float, spread: Spread) -> str:
+def spread_text(title: str, value: float, spread: Spread) -> str:
+    """Return a mean, and the spread of the times [ns] behind it in seconds."""
     return (
         f"{title}: {value:.3f}\n\tmin: {spread.minimum * 1e-9:.3f}s max: {spread.maximum * 1e-9:.3f}s "
         f"std dev: {spread.std_dev * 1e-9:.5f}s window: {spread.window}"
@@ -162,7 +164,7 @@ _HEADER = ("topic", "rate", "min_delta", "max_delta", "std_dev", "window")
 def _row(name: str, spread: Spread) -> tuple[str, ...]:
     return (
         name,
-        f"{_rate(spread):.3f}",
+        f"{rate_hz(spread):.3f}",
         f"{spread.minimum * 1e-9:.3f}",
         f"{spread.maximum * 1e-9:.3f}",
         f"{spread.std_dev * 1e-9:.5f}",
@@ -181,7 +183,8 @@ def _table(rates: dict[str, RateStatistics]) -> str:
     return "\n".join([head, "=" * (sum(widths) + 3 * (len(widths) - 1)), *lines, ""])
 
 
-def _bandwidth_text(bandwidth: Bandwidth | None) -> str:
+def bandwidth_text(bandwidth: Bandwidth | None) -> str:
+    """Return a bandwidth in the unit that suits it; nothing if it is not known yet."""
     if bandwidth is None:
         return ""
     rate = bandwidth.bytes_per_s
