@@ -24,6 +24,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from twin.cli import app as app_module
+from twin.cli.console import WIDE
 from twin.cli.own_commands import TABLE
 from twin.cli.play import find_recording
 from twin.cli.run import batch
@@ -266,6 +267,23 @@ def test_a_pace_that_was_lost_is_told(
     runtime.metrics |= {"pace_losses": losses, "pace_lost_s": lost_s}
     _, out, _ = invoke("run", str(demo), "--pace", "1", "--no-record")
     assert re.findall(r"the pace was (.*\S)", out) == ([told] if told else [])
+
+
+@pytest.mark.parametrize(("width", "shown"), [(80, 46), (100, 59)])
+def test_a_long_name_of_a_check_is_cut_on_a_terminal_alone(width: int, shown: int) -> None:
+    name = "always(" + "x" * 120 + ")"
+    check = CheckResult(name=name, passed=True, value=2.5, limit=2.0, unit="m", at_s=1.0, margin=0.5)
+    verdict = Verdict(scenario="demo", seed=1, checks=(check,)).to_dict()
+
+    def printed(columns: int, *, short: bool) -> str:
+        console = Console(width=columns, file=io.StringIO())
+        console.print(verdict_report(verdict, None, short=short))
+        return console.file.getvalue()  # type: ignore[attr-defined, no-any-return]
+
+    cut = printed(width, short=True)
+    assert f" ok  {name[:shown]}… " in cut
+    assert max(map(len, cut.splitlines())) <= width
+    assert name in printed(WIDE, short=False)
 
 
 def test_what_became_of_faults_is_told() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -33,9 +34,9 @@ class PluginGroup(ParameterGroup):
     _params: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
     @classmethod
+    @abstractmethod
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys that are not a user's plugin's, which has all others."""
-        raise NotImplementedError
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:

@@ -163,7 +163,8 @@ def validate(schema: type[M], document: Document, more: Mapping[str, Any] = Mapp
     data, meant = _corrected(document, first)
     _, second = findings(schema, data, context)
     found = [finding for finding in first if finding.kind != "missing key" or finding.loc not in meant]
-    known = {finding.loc for finding in found}
+    # Where a corrected key's value is wrong the key was perhaps another one: that fault may be made up.
+    known = {finding.loc for finding in found} | meant
     found += [finding for finding in second if not any(_above(finding.loc, loc) for loc in known)]
     document.problems += [document.problem(finding.loc, finding.message) for finding in dict.fromkeys(found)]
     return None

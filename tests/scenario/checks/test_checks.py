@@ -83,6 +83,17 @@ def test_time_limit() -> None:
     assert fold(entry, [at(9)]).reason == "the mission was not done after 9.0 s"
 
 
+def test_a_time_limit_is_decided_when_it_passes() -> None:
+    check = CheckEntry.model_validate({"time_limit": {"limit": "10 s"}}).build(CONTEXT)
+    seen = []
+    for observation in (at(9), at(10), at(10.5), at(12, mission_done=True)):
+        check.observe(observation)
+        seen.append(check.decided)
+    result = check.result()
+    assert seen == [None, None, False, False]
+    assert (result.passed, result.value, result.at_s) == (False, 12.0, 10.5)
+
+
 DELIVERED = {"delivered": {"tote": "tote_a", "zone": "unloading"}}
 
 

@@ -47,6 +47,21 @@ def test_a_verdict_has_the_margin_the_worst_moment_and_what_it_was_then() -> Non
     assert (result.margin, result.worst_s, result.at_s) == (pytest.approx(0.1), 2.0, 3.0)
 
 
+@pytest.mark.parametrize(
+    ("kind", "entry", "name"),
+    [
+        ("always", {"signal": "speed", "below": 2}, "always(speed < 2)"),
+        ("always", {"signal": "speed", "below": 2, "label": "slow enough"}, "slow enough"),
+        ("finally", {"that": "speed < 2", "label": "slow in the end"}, "slow in the end"),
+        ("formula", {"that": "never speed > 2", "label": "never fast"}, "never fast"),
+        ("reaches", {"x": 0, "y": 0, "label": "is there"}, "is there"),
+    ],
+)
+def test_the_verdict_calls_a_check_by_its_label(kind: str, entry: dict[str, Any], name: str) -> None:
+    result = fold({kind: entry}, driving(0.0, 0.5))
+    assert (result.name, result.passed) == (name, True)
+
+
 def test_a_failure_tells_the_worst_moment_and_is_decided_at_the_first() -> None:
     result = fold({"always": "speed < 1"}, driving(0.0, 1.25, 1.5, 0.5))
     assert (result.passed, result.margin, result.worst_s) == (False, -0.5, 2.0)

@@ -48,13 +48,12 @@ def diff(
     from twin.bridge.programs.console_log import show_warnings
     from twin.cli.run.once import run_progress
     from twin.cli.run.options import parse_overrides
-    from twin.experiments.diff import compare, made_again, of_path
+    from twin.experiments.diff import compare, sides
 
     overrides = parse_overrides(set or (), seed)
     show_warnings()
     with run_progress("diff") as progress:
-        one = of_path(a, progress=progress)
-        other = of_path(b, overrides, progress) if b is not None else made_again(one, overrides, progress)
+        one, other = sides(a, b, overrides, progress)
         found = compare(one, other, progress)
     print_difference(found, as_json=json)
     raise typer.Exit(0 if found.same else 1)

@@ -78,11 +78,13 @@ def run_once(options: RunOptions) -> int:
         from twin.cli.run.verdict_table import verdict_report
 
         assert simulation.folder is not None
-        stdout().print(verdict_report(verdict.to_dict(), simulation.folder))
+        console = stdout()
+        short = console.is_terminal
+        console.print(verdict_report(verdict.to_dict(), simulation.folder, short=short))
         if difference is not None:
             from twin.cli.experiments.difference_table import difference_report
 
-            stdout().print(difference_report(difference))
+            console.print(difference_report(difference))
     return max(verdict.exit_code, int(difference is not None and not difference.same))
 
 

@@ -14,23 +14,33 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+_LONGEST = 60
+"""Characters of a check's name on a terminal; what fails is named in full below."""
+
 STYLE = {"pass": "bold green", "fail": "bold red", "error": "bold magenta", "inconclusive": "bold yellow"}
 
 
-def verdict_report(verdict: Mapping[str, Any], folder: Path | None) -> Group:
-    """Return the table of the checks of one run, then the verdict, then what was written."""
+def verdict_report(verdict: Mapping[str, Any], folder: Path | None, *, short: bool = False) -> Group:
+    """Return the table of the checks of one run, then the verdict, then what was written.
+
+    Args:
+        verdict: As in its file.
+        folder: Of the run.
+        short: Whether long names of checks are cut, as a terminal needs it.
+    """
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
     table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
     table.add_column("")
-    table.add_column("check", overflow="fold")
+    table.add_column("check", max_width=_LONGEST if short else None)
     for name in ("value", "limit", "margin", "at"):
         table.add_column(name, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
-        table.add_row(mark, Text(check["name"]), *numbers_of(check))
+        name = Text(check["name"], no_wrap=True, overflow="ellipsis")
+        table.add_row(mark, name, *numbers_of(check))
     lines: list[Table | Text] = [table] if verdict["checks"] else []
     lines += [_faults(verdict["faults"])] if verdict["faults"] else []
     lines += [Text(reason, style="red") for reason in reasons(verdict)]

@@ -2,6 +2,6 @@
 
 from twin.experiments.diff.compare import compare
 from twin.experiments.diff.difference import Difference, Divergence
-from twin.experiments.diff.side import Side, made_again, of_path
+from twin.experiments.diff.side import Side, made_again, of_path, sides
 
-__all__ = ["Difference", "Divergence", "Side", "compare", "made_again", "of_path"]
+__all__ = ["Difference", "Divergence", "Side", "compare", "made_again", "of_path", "sides"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from twin.errors import RecordingError
+from twin.errors import RecordingError, ScenarioError
 from twin.plugins import execution
 from twin.recording.hashes import HASHES
 from twin.runtime.kept_run import KeptRun
@@ -47,6 +47,32 @@ class Side:
         return Outside(nodes=self.run.provenance.nodes)
 
 
+def sides(
+    a: str | Path,
+    b: str | Path | None = None,
+    overrides: Overrides = NO_OVERRIDES,
+    progress: Callable[[Progress], None] | None = None,
+) -> tuple[Side, Side]:
+    """Return the runs that two paths mean; what is wrong with either is told before one is made.
+
+    Args:
+        a: See `of_path`.
+        b: Another; None: `a`, made again now.
+        overrides: Of the scenario of `b`.
+        progress: Called about four times a second of a run.
+
+    Raises:
+        TwinError: See `of_path`.
+    """
+    for path, changes in ((a, NO_OVERRIDES), (a if b is None else b, overrides)):
+        if not _is_kept(Path(path)):
+            load(_scenario(path), changes)
+        elif b is not None:
+            of_path(path, changes)
+    one = of_path(a, progress=progress)
+    return one, made_again(one, overrides, progress) if b is None else of_path(b, overrides, progress)
+
+
 def of_path(
     path: str | Path,
     overrides: Overrides = NO_OVERRIDES,
@@ -63,14 +89,25 @@ def of_path(
         TwinError: There is no such thing, the run cannot be made, or has been made already and is to change.
     """
     path = Path(path)
-    if path.is_dir() or path.suffix == ".json":
+    if _is_kept(path):
         if overrides:
             raise RecordingError(f"{path}: this run is over; overrides are for a scenario that is run now")
         return Side(name=str(path), run=KeptRun.read(path / HASHES if path.is_dir() else path))
     with execution():
-        scenario = load(catalogue.resolve(path), overrides, execute=True)
+        scenario = load(_scenario(path), overrides, execute=True)
         name = " ".join([str(path), *(f"{key}={value}" for key, value in overrides.items())])
         return Side(name=name, run=_made(scenario, Outside(), progress))
+
+
+def _is_kept(path: Path) -> bool:
+    return path.is_dir() or path.suffix == ".json"
+
+
+def _scenario(path: str | Path) -> Path:
+    try:
+        return catalogue.resolve(path)
+    except ScenarioError as fault:
+        raise ScenarioError(f"{path}: no folder of a run, and {fault}") from None
 
 
 def made_again(

@@ -90,13 +90,25 @@ class TimeLimitConfig(CheckConfig):
 
 
 class TimeLimit(_MissionCheck):
-    """Passes if it is done in time."""
+    """Passes if it is done in time; fails as soon as the time is over."""
 
     Config = TimeLimitConfig
     config: TimeLimitConfig
+    _over_s: float | None = None
+
+    def observe(self, observation: Observation) -> None:
+        """Take one observation."""
+        super().observe(observation)
+        if self._over_s is None and self._at_s is not None and self._at_s > self.config.limit:
+            self._over_s = self._at_s
+
+    @property
+    def decided(self) -> bool | None:
+        """Whether it holds, whatever comes."""
+        return super().decided if self._over_s is None else False
 
     def result(self) -> CheckResult:
-        """Return the outcome so far."""
+        """Return the outcome so far; the value is when the mission was done, or how long it was waited for."""
         last, time_s, reason = self._last, self._at_s, ""
         if last is None:
             reason = "the run made no step"
@@ -106,7 +118,8 @@ class TimeLimit(_MissionCheck):
             reason = f"the mission took {time_s:.1f} s"
         margin = None if time_s is None else self.config.limit - time_s
         margin = margin if margin is None or (margin < 0.0) == bool(reason) else None
-        return self._judged(reason, time_s, self.config.limit, "s", time_s, margin)
+        at_s = time_s if self._over_s is None else self._over_s
+        return self._judged(reason, time_s, self.config.limit, "s", at_s, margin)
 
 
 class RecoveriesConfig(RobotCheckConfig):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -52,13 +53,13 @@ class FormulaModel(StrictModel):
         self.formula()
         return self
 
+    @abstractmethod
     def formula(self) -> Formula:
         """Return what it means; raises Faults."""
-        raise NotImplementedError
 
+    @abstractmethod
     def words(self) -> str:
         """Return it as a short text."""
-        raise NotImplementedError
 
     def reference(self, signal: str) -> Reference:
         """Return what a name of a signal means here."""

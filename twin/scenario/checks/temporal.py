@@ -9,6 +9,7 @@ from twin.parameters import Metres, NotNegative, Positive, Radians, Seconds
 from twin.scenario.checks.check import CheckConfig
 from twin.scenario.checks.signal_check import SignalCheck
 from twin.scenario.checks.statement import FormulaModel, Statement, StatementOrText
+from twin.scenario.observation import CheckContext
 from twin.scenario.signals.reference import Reference
 from twin.scenario.temporal import (
     FOREVER,
@@ -28,8 +29,20 @@ from twin.strict_yaml import Fault, Faults
 class TemporalConfig(FormulaModel, CheckConfig):
     """A check that is a formula."""
 
+    label: str | None = None
+    """What the verdict calls the check; absent: its kind and formula."""
     robot: str | None = None
     """The robot whose signals are meant where none is named; may be left out if there is only one."""
+
+    @property
+    def subject(self) -> str:
+        """What the verdict calls it, after the name of the kind."""
+        return self.words()
+
+
+class WindowConfig(TemporalConfig):
+    """A formula over a time."""
+
     after: Annotated[Seconds, NotNegative] = 0.0
     """Begin of the time that counts [s]."""
     before: Annotated[Seconds, NotNegative] | None = None
@@ -50,11 +63,7 @@ class TemporalConfig(FormulaModel, CheckConfig):
         return self.words() + (f", {self.after:g} to {end} s" if self.after or self.before else "")
 
 
-class SpanConfig(Statement, TemporalConfig):
-    """A statement over a time."""
-
-
-class AlwaysConfig(SpanConfig):
+class AlwaysConfig(Statement, WindowConfig):
     """A statement holds all the time."""
 
     def formula(self) -> Formula:
@@ -62,7 +71,7 @@ class AlwaysConfig(SpanConfig):
         return Always(super().formula(), self.window)
 
 
-class NeverConfig(SpanConfig):
+class NeverConfig(Statement, WindowConfig):
     """A statement holds at no time."""
 
     def formula(self) -> Formula:
@@ -70,7 +79,7 @@ class NeverConfig(SpanConfig):
         return never(super().formula(), self.window)
 
 
-class EventuallyConfig(SpanConfig):
+class EventuallyConfig(Statement, WindowConfig):
     """A statement holds at some time."""
 
     def formula(self) -> Formula:
@@ -78,27 +87,20 @@ class EventuallyConfig(SpanConfig):
         return eventually(super().formula(), self.window)
 
 
-class FinallyConfig(Statement, CheckConfig):
+class FinallyConfig(Statement, TemporalConfig):
     """A statement holds at the end."""
-
-    robot: str | None = None
-    """The robot whose signals are meant where none is named; may be left out if there is only one."""
 
     def formula(self) -> Formula:
         """Return what it means; raises Faults."""
         return Finally(super().formula())
 
-    subject = property(Statement.words)
 
-
-class FormulaConfig(FormulaModel, CheckConfig):
+class FormulaConfig(TemporalConfig):
     """A formula holds: `always[0, 60](clearance > 5 cm) and eventually speed > 0.3`."""
 
     takes_text = True
     that: str
     """The formula; a text alone in the place of the mapping is it, too."""
-    robot: str | None = None
-    """The robot whose signals are meant where none is named; may be left out if there is only one."""
 
     def formula(self) -> Formula:
         """Return what it means; raises Faults."""
@@ -108,10 +110,8 @@ class FormulaConfig(FormulaModel, CheckConfig):
         """Return it in one line."""
         return " ".join(self.that.split())
 
-    subject = property(words)
 
-
-class UntilConfig(TemporalConfig):
+class UntilConfig(WindowConfig):
     """One statement holds until another one does, which must come."""
 
     first: StatementOrText
@@ -128,7 +128,7 @@ class UntilConfig(TemporalConfig):
         return f"{self.first.words()}, then {self.then.words()}"
 
 
-class WithinConfig(TemporalConfig):
+class WithinConfig(WindowConfig):
     """Whenever one statement holds, another one does soon after."""
 
     time: Annotated[Seconds, Positive]
@@ -148,7 +148,7 @@ class WithinConfig(TemporalConfig):
         return f"{self.time:g} s of {self.of.words()}, {self.then.words()}"
 
 
-class ReachesConfig(TemporalConfig):
+class ReachesConfig(WindowConfig):
     """A robot's base comes to a place, at some time."""
 
     x: Metres | None = None
@@ -184,9 +184,12 @@ def _ns(seconds: float) -> int:
 
 
 class TemporalCheck(SignalCheck):
-    """The formula of a file."""
+    """The formula of a file, named by its label if it has one."""
 
-    config: TemporalConfig | FormulaConfig
+    config: TemporalConfig
+
+    def __init__(self, name: str, config: TemporalConfig, context: CheckContext) -> None:
+        super().__init__(config.label or name, config, context)
 
     def formula(self) -> Formula:
         """Return what the file says."""
@@ -197,49 +200,16 @@ class TemporalCheck(SignalCheck):
         return self.config.reference(signal)
 
 
-class AlwaysCheck(TemporalCheck):
-    """Holds all the time."""
-
-    Config = AlwaysConfig
-
-
-class NeverCheck(TemporalCheck):
-    """Holds at no time."""
-
-    Config = NeverConfig
+def _check(config: type[TemporalConfig]) -> type[TemporalCheck]:
+    name = config.__name__.replace("Config", "Check")
+    return type(name, (TemporalCheck,), {"Config": config, "__doc__": config.__doc__, "__module__": __name__})
 
 
-class EventuallyCheck(TemporalCheck):
-    """Holds at some time."""
-
-    Config = EventuallyConfig
-
-
-class UntilCheck(TemporalCheck):
-    """One holds until the other does."""
-
-    Config = UntilConfig
-
-
-class WithinCheck(TemporalCheck):
-    """One follows the other soon."""
-
-    Config = WithinConfig
-
-
-class ReachesCheck(TemporalCheck):
-    """The place was reached."""
-
-    Config = ReachesConfig
-
-
-class FinallyCheck(TemporalCheck):
-    """Holds at the end."""
-
-    Config = FinallyConfig
-
-
-class FormulaCheck(TemporalCheck):
-    """The formula holds."""
-
-    Config = FormulaConfig
+AlwaysCheck = _check(AlwaysConfig)
+NeverCheck = _check(NeverConfig)
+EventuallyCheck = _check(EventuallyConfig)
+FinallyCheck = _check(FinallyConfig)
+FormulaCheck = _check(FormulaConfig)
+UntilCheck = _check(UntilConfig)
+WithinCheck = _check(WithinConfig)
+ReachesCheck = _check(ReachesConfig)
