@@ -100,6 +100,14 @@ def test_a_wrong_action_is_told_in_one_sentence(env, vector, action, said):
     made.step(np.zeros((4, 2)))  # nothing was done, and it goes on
 
 
+def test_an_action_that_is_no_array_is_told_in_one_sentence(env, vector):
+    env.reset(seed=0)
+    vector.reset(seed=0)
+    for made in (env, vector):
+        with pytest.raises(GymError, match=r"^the action \[0.0, \[1.0, 2.0\]\] is no array; valid: "):
+            made.unwrapped.step([0.0, [1.0, 2.0]])
+
+
 def test_actions_beyond_the_space_count_as_its_bounds(env):
     ends = []
     for action in ((1.0, -1.0), (7.0, -3.0)):

@@ -6,9 +6,13 @@ Importing this module registers them, so `gym.make("twin.envs:twin/DiffDriveGoal
 
 from gymnasium.envs.registration import register, registry
 
-from twin.envs.scenario.registration import register_scenarios
-
+SCENARIO = "twin/Scenario-v0"
+"""Takes what `twin.make_env` takes."""
 _NAVIGATION = (("DiffDriveGoal", "diff_drive_goal", 300), ("WarehouseNav", "warehouse_nav", 600))
+_SCENARIOS = (
+    (SCENARIO, "twin.envs.scenario.env:ScenarioEnv"),
+    ("twin/WarehousePick-v0", "twin.envs.scenario.pick.env:WarehousePickEnv"),
+)
 
 for _name, _module, _steps in _NAVIGATION:
     if f"twin/{_name}-v0" not in registry:
@@ -18,4 +22,6 @@ for _name, _module, _steps in _NAVIGATION:
             vector_entry_point=f"twin.envs.{_module}:{_name}VectorEnv",
             max_episode_steps=_steps,
         )
-register_scenarios()
+for _name, _entry_point in _SCENARIOS:
+    if _name not in registry:
+        register(_name, _entry_point, order_enforce=False, disable_env_checker=True)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import count
+from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 
 from twin.envs.gym_envs import NavigationEnv, NavigationVectorEnv
-from twin.envs.navigation import Course, Layout, Navigation, NavigationConfig
+from twin.envs.navigation import Course, Layout, Navigation, NavigationConfig, placed_box
 from twin.envs.randomisation import Episode
 from twin.envs.robot import DrivenRobot
 from twin.errors import GymError
 from twin.geometry import Array, Pose2, Pose3
 from twin.models.shapes import Box
-from twin.sim.scene import PlacedBody, Scene, Shape, StaticBody
+from twin.sim.scene import Scene, Shape, StaticBody
 from twin.warehouse.arena_scene import PALETTE
 
 _WALL, _HEIGHT = 0.1, 0.5
@@ -67,12 +67,7 @@ class Room(Course):
     def __init__(self, config: DiffDriveGoalConfig) -> None:
         self.config = config
         boxes = tuple(
-            PlacedBody(
-                name=f"box_{i}",
-                T_world_body=Pose3.from_xyz_rpy((0.0, 0.0, _HEIGHT / 2.0)),
-                shapes=(Shape(geometry=Box(size=(*size, _HEIGHT)), rgba=PALETTE["orange"]),),
-            )
-            for i, size in enumerate(config.boxes)
+            placed_box(f"box_{i}", (*size, _HEIGHT), "orange") for i, size in enumerate(config.boxes)
         )
         self.scene = self.looks = Scene(name="room", statics=tuple(self._walls()), placed=boxes)
         self.overview = 1.3 * max(config.room)
@@ -141,10 +136,8 @@ class DiffDriveGoalVectorEnv(NavigationVectorEnv):
         num_envs: int = 1,
         *,
         config: DiffDriveGoalConfig | None = None,
-        max_episode_steps: int | None = None,
-        render_mode: str | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         threads: int = 0,
+        **options: Any,
     ) -> None:
-        navigation = _navigation(config, num_envs, threads)
-        super().__init__(navigation, max_episode_steps, render_mode, autoreset_mode)
+        """Take their number, the threads that share them (0: one for each CPU), and what the base takes."""
+        super().__init__(_navigation(config, num_envs, threads), **options)

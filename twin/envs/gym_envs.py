@@ -53,7 +53,7 @@ class NavigationEnv(gym.Env[Observation, Observation]):
         """Drive for a decision period."""
         if self._episode < 0:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        outcome = self.navigation.act(_checked(_one(action), 1))
+        outcome = self.navigation.act(_checked(action, 2))
         if self.render_mode == "human":
             self.navigation.show()
         info = {name: values[0].item() for name, values in _info(outcome).items()}
@@ -77,7 +77,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
     def __init__(
         self,
         navigation: Navigation,
-        max_episode_steps: int | None,
+        max_episode_steps: int | None = None,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ) -> None:
@@ -165,7 +165,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         """Drive for a decision period; who is over begins anew as the autoreset mode says."""
         if not self._seeds:
             raise gym.error.ResetNeeded("Cannot call env.step() before calling env.reset()")
-        checked, ended = _checked(np.asarray(actions), self.num_envs), self._over
+        checked, ended = _checked(actions, self.num_envs, 2), self._over
         if self._mode == AutoresetMode.DISABLED and ended.any():
             which = int(np.argmax(ended))
             raise GymError(f"environment {which} is over; valid: reset it, with option 'reset_mask'")
@@ -224,24 +224,21 @@ def _known(render_mode: str | None, metadata: Mapping[str, Any]) -> str | None:
 _VALID = "linear and angular velocity, each in [-1, 1]"
 
 
-def _one(action: ArrayLike) -> NDArray[Any]:
-    """Return the action of one environment as a row of its own."""
-    given = np.asarray(action)
-    if given.shape != (2,):
-        raise GymError(f"the action has shape {given.shape}; valid: (2,), {_VALID}")
-    return given[None]
-
-
-def _checked(actions: NDArray[Any], n: int) -> Array:
-    """Return n actions as numbers; what is beyond [-1, 1] counts as there.
+def _checked(given: ArrayLike, *shape: int) -> Array:
+    """Return actions of a shape as numbers, shape (n, 2); what is beyond [-1, 1] counts as there.
 
     Raises:
         GymError: They have another shape, or are not finite.
     """
-    if actions.shape != (n, 2):
-        raise GymError(f"actions have shape {actions.shape}; valid: {(n, 2)}, of {_VALID}")
+    try:
+        actions = np.asarray(given)
+    except ValueError:
+        raise GymError(f"the action {given!r} is no array; valid: {_VALID}") from None
+    if actions.shape != shape:
+        raise GymError(f"actions have shape {actions.shape}; valid: {shape}, of {_VALID}")
     if actions.dtype.kind not in "fiu":
         raise GymError(f"actions are of type {actions.dtype}; valid: numbers, of {_VALID}")
+    actions = actions.reshape(-1, 2)
     finite = np.isfinite(actions).all(axis=1)
     if not finite.all():
         which = int(np.argmin(finite))

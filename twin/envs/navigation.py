@@ -20,8 +20,10 @@ from twin.envs.randomisation import Episode, Randomisation
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import ALL, Rows, Simulations
 from twin.errors import GymError, nearest
-from twin.geometry import Array, Pose2, quat_wxyz_from_yaw
-from twin.sim.scene import Scene
+from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_yaw
+from twin.models.shapes import Box
+from twin.sim.scene import PlacedBody, Scene, Shape
+from twin.warehouse.arena_scene import PALETTE
 
 if TYPE_CHECKING:
     from twin.envs.live import LiveWindow
@@ -305,3 +307,9 @@ def _with_options(layout: Layout, options: Mapping[str, Any] | None) -> Layout:
             words = "x [m], y [m], yaw [rad]" if length == 3 else "x [m], y [m]"
             raise GymError(f"option '{name}' of reset is {value!r}; valid: {words}")
     return layout._replace(start=Pose2(*map(float, start)), goal=(float(goal[0]), float(goal[1])))
+
+
+def placed_box(name: str, size: tuple[float, float, float], colour: str) -> PlacedBody:
+    """Return a box that stands on the floor where an episode puts it: its extent [m], a name of `PALETTE`."""
+    shape = Shape(geometry=Box(size=size), rgba=PALETTE[colour])
+    return PlacedBody(name=name, T_world_body=Pose3.from_xyz_rpy((0.0, 0.0, size[2] / 2.0)), shapes=(shape,))

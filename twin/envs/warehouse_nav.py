@@ -9,23 +9,21 @@ from itertools import count, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from twin.envs import kernels
 from twin.envs.gym_envs import NavigationEnv, NavigationVectorEnv
-from twin.envs.navigation import Course, Layout, Navigation, NavigationConfig
+from twin.envs.navigation import Course, Layout, Navigation, NavigationConfig, placed_box
 from twin.envs.randomisation import Episode
 from twin.envs.robot import DrivenRobot
 from twin.envs.simulations import Rows
 from twin.envs.walkers import WalkerConfig, Walkers
 from twin.envs.ways import Ways
 from twin.errors import GymError
-from twin.geometry import Array, Pose2, Pose3
+from twin.geometry import Array, Pose2
 from twin.models.shapes import Box
-from twin.sim.scene import PlacedBody, Shape, StaticBody
+from twin.sim.scene import Shape, StaticBody
 from twin.warehouse import arena as arenas
-from twin.warehouse.arena_scene import PALETTE
 from twin.warehouse.map_files import map_of_arena
 
 _LOW = 0.3
@@ -80,10 +78,10 @@ class Aisles(Course):
         self.config = config
         arena = arenas.load(config.arena)
         boxes = tuple(
-            _placed(f"box_{i}", (*size, _BOX_HEIGHT), "orange") for i, size in enumerate(config.boxes)
+            placed_box(f"box_{i}", (*size, _BOX_HEIGHT), "orange") for i, size in enumerate(config.boxes)
         )
         walkers = tuple(
-            _placed(f"walker_{i}", walker.size, "yellow") for i, walker in enumerate(config.walkers)
+            placed_box(f"walker_{i}", walker.size, "yellow") for i, walker in enumerate(config.walkers)
         )
         whole = arena.scene()
         self.looks = replace(whole, placed=(*boxes, *walkers))
@@ -197,11 +195,6 @@ class WarehouseNavigation(Navigation):
         return points
 
 
-def _placed(name: str, size: tuple[float, float, float], colour: str) -> PlacedBody:
-    shape = Shape(geometry=Box(size=size), rgba=PALETTE[colour])
-    return PlacedBody(name=name, T_world_body=Pose3.from_xyz_rpy((0.0, 0.0, size[2] / 2.0)), shapes=(shape,))
-
-
 def _low(statics: tuple[StaticBody, ...]) -> Iterator[StaticBody]:
     for static in statics:
         low = tuple(shape for shape in static.shapes if shape.solid and _bottom(static, shape) < _LOW)
@@ -241,10 +234,8 @@ class WarehouseNavVectorEnv(NavigationVectorEnv):
         num_envs: int = 1,
         *,
         config: WarehouseNavConfig | None = None,
-        max_episode_steps: int | None = None,
-        render_mode: str | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         threads: int = 0,
+        **options: Any,
     ) -> None:
-        navigation = WarehouseNavigation(config or WarehouseNavConfig(), num_envs, threads)
-        super().__init__(navigation, max_episode_steps, render_mode, autoreset_mode)
+        """Take their number, the threads that share them (0: one for each CPU), and what the base takes."""
+        super().__init__(WarehouseNavigation(config or WarehouseNavConfig(), num_envs, threads), **options)

@@ -207,6 +207,18 @@ def test_of_several_robots_one_has_to_be_named(folder: Path) -> None:
         twin.make_env(folder / "two.yaml")
 
 
+def test_without_a_scenario_it_is_one_sentence() -> None:
+    with pytest.raises(GymError, match=r"needs scenario=\.\.\., the name or file of a scenario"):
+        gym.make("twin.envs:twin/Scenario-v0")
+
+
+def test_times_are_those_of_whole_nanoseconds(make: MakeEnv, small: Path) -> None:
+    env = make(small, ticks=5)
+    env.reset()
+    times = [env.step(np.zeros(2))[4]["time_s"] for _ in range(4)]
+    assert times == [round(time, 9) for time in times], "such as 0.3, not 0.30000000000000004"
+
+
 def test_a_wrong_action_is_one_sentence_and_the_run_goes_on(make: MakeEnv, small: Path) -> None:
     env = make(small)
     with pytest.raises(GymError, match=r"the run is over, or has not begun; call reset\(\)"):

@@ -14,8 +14,8 @@ import numpy as np
 from twin.envs.scenario.agents import AGENTS
 from twin.envs.scenario.agents.agent import Agent, Values
 from twin.envs.scenario.episode import Episode
-from twin.envs.scenario.observations.channel import Channel
-from twin.envs.scenario.observations.observer import Observer
+from twin.envs.scenario.observations import Channel
+from twin.envs.scenario.observer import Observer
 from twin.envs.scenario.rewards import Reward, require_terms
 from twin.envs.scenario.screen import Screen
 from twin.errors import GymError, nearest
@@ -45,7 +45,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
 
     def __init__(
         self,
-        scenario: Scenario | str | Path,
+        scenario: Scenario | str | Path | None = None,
         agent: str | type[Agent] = "drive",
         *,
         robot: str | None = None,
@@ -63,6 +63,8 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         Raises:
             TwinError: The scenario cannot be run, or is no environment for this agent.
         """
+        if scenario is None:
+            raise GymError("an environment needs scenario=..., the name or file of a scenario")
         self._kind = agent_of(agent)
         self._config = config_of(self._kind, settings)
         self._file, self._overrides = scenario, dict(overrides)
@@ -267,11 +269,11 @@ def agent_of(agent: str | type[Agent]) -> type[Agent]:
     Raises:
         GymError: There is none of that name.
     """
-    if isinstance(agent, str):
-        if agent not in AGENTS:
-            raise GymError(f"there is no agent '{agent}'; {nearest(agent, AGENTS)}")
-        return AGENTS[agent]
-    return agent
+    if isinstance(agent, type):
+        return agent
+    if agent not in AGENTS:
+        raise GymError(f"there is no agent '{agent}'; {nearest(agent, AGENTS)}")
+    return AGENTS[agent]
 
 
 def config_of(kind: type[Agent], settings: Mapping[str, Any]) -> Any:

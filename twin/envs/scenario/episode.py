@@ -18,8 +18,6 @@ from twin.scenario.missions import Idle
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
 
-_S = 1e-9
-
 
 class Heard:
     """The last message on a topic."""
@@ -35,7 +33,7 @@ class Heard:
 
     def age(self, now_ns: int) -> float:
         """Return how old it is by its stamp, else since it came [s]; infinite if none has come."""
-        return float("inf") if self.message is None else (now_ns - self._at_ns) * _S
+        return float("inf") if self.message is None else (now_ns - self._at_ns) * 1e-9
 
 
 class Episode:
@@ -83,7 +81,7 @@ class Episode:
     @property
     def time(self) -> float:
         """Simulated time since the start [s]."""
-        return self.world.time_ns * _S
+        return self.world.time_ns / 1e9
 
     @property
     def over(self) -> bool:

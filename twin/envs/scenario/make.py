@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
+from twin.envs import SCENARIO
 from twin.envs.scenario.env import NOTHING, ScenarioEnv
-from twin.envs.scenario.registration import SCENARIO, register_scenarios
 from twin.runtime import end_threads
 
 if TYPE_CHECKING:
     from twin.envs.scenario.agents.agent import Agent
-    from twin.envs.scenario.observations.channel import Channel
+    from twin.envs.scenario.observations import Channel
     from twin.scenario.schema import Scenario
 
 
@@ -52,21 +52,9 @@ def make_env(
     Raises:
         TwinError: The scenario cannot be run, or is no environment for this agent.
     """
-    options: dict[str, Any] = {
-        "scenario": scenario,
-        "agent": agent,
-        "robot": robot,
-        "observe": observe,
-        "reward": reward,
-        "ticks": ticks,
-        "overrides": dict(overrides),
-        "render_mode": render_mode,
-        "width": width,
-        "height": height,
-        **settings,
-    }
+    options = locals() | {"overrides": dict(overrides)}  # a proxy could not be told to another process
+    options |= options.pop("settings")
     made = ScenarioEnv(**options)
-    register_scenarios()
     made.spec = replace(gym.spec(SCENARIO), kwargs=options)
     return made
 
@@ -95,7 +83,6 @@ def make_vec_env(
     Raises:
         TwinError: As `make_env`.
     """
-    register_scenarios()
     end_threads()  # processes may be forked
     return gym.make_vec(
         SCENARIO,

@@ -40,17 +40,29 @@ class Progress(Term):
         return gain
 
 
-class GoalsReached(Term):
-    """Goals of the mission that ended with success."""
+class Growth(Term):
+    """By how much something grew within the step."""
 
     def __init__(self, episode: Episode) -> None:
         super().__init__(episode)
-        self._before = episode.task.reached
+        self._before = self.measure()
+
+    @abstractmethod
+    def measure(self) -> float:
+        """Return what is to grow."""
 
     def value(self) -> float:
-        """Return how many more there are."""
-        before, self._before = self._before, self.episode.task.reached
-        return float(self._before - before)
+        """Return by how much it grew."""
+        before, self._before = self._before, self.measure()
+        return self._before - before
+
+
+class GoalsReached(Growth):
+    """Goals of the mission that ended with success."""
+
+    def measure(self) -> float:
+        """Return how many there are."""
+        return float(self.episode.task.reached)
 
 
 class Mission(Term):
@@ -88,17 +100,12 @@ class Collision(Term):
         )
 
 
-class Time(Term):
+class Time(Growth):
     """Simulated seconds that went by, negative."""
 
-    def __init__(self, episode: Episode) -> None:
-        super().__init__(episode)
-        self._before = episode.time
-
-    def value(self) -> float:
-        """Return them."""
-        before, self._before = self._before, self.episode.time
-        return before - self._before
+    def measure(self) -> float:
+        """Return what is left of an endless time."""
+        return -self.episode.time
 
 
 TERMS: dict[str, type[Term]] = {

@@ -8,60 +8,18 @@ from twin.plugins import Kind
 MUTANTS: Kind[Mutant] = Kind("mutant", base="twin.experiments.mutants.mutant:Mutant", group="twin.mutants")
 
 _CATALOGUE = {
-    "drive": (
-        "MirroredWheel",
-        "SwappedWheels",
-        "MirroredEncoder",
-        "WheelRadiusOff",
-        "TrackOff",
-        "LostBrake",
-        "ClippedSpeed",
-        "DoubledCommands",
-        "LateCommands",
-        "LateOdometry",
-        "FrozenOdometry",
-    ),
-    "sensing": (
-        "LidarYaw",
-        "LidarMirrored",
-        "LidarFrame",
-        "LidarScale",
-        "DeadRays",
-        "NoisyLidar",
-        "FrozenLidar",
-        "LateStamps",
-        "EarlyStamps",
-    ),
-    "localisation": ("FrozenLocalisation", "MapShifted", "MapMirrored", "WrongStart", "NoLocalisation"),
-    "navigation": (
-        "SmallInflation",
-        "SmallFootprint",
-        "NoCollisionMonitor",
-        "StaleCostmap",
-        "BlindCostmap",
-        "BlindPlanner",
-        "CoarseGoal",
-        "NoRecovery",
-        "HastyController",
-    ),
-    "manipulation": (
-        "WeakGrasp",
-        "EarlyGripper",
-        "EarlyRelease",
-        "ShallowPlace",
-        "LowCarry",
-        "ApproachOffset",
-        "ArmOffset",
-        "LiftOffset",
-    ),
+    "drive": """mirrored_wheel swapped_wheels mirrored_encoder wheel_radius_off track_off lost_brake
+        clipped_speed doubled_commands late_commands late_odometry frozen_odometry""",
+    "sensing": """lidar_yaw lidar_mirrored lidar_frame lidar_scale dead_rays noisy_lidar frozen_lidar
+        late_stamps early_stamps""",
+    "localisation": "frozen_localisation map_shifted map_mirrored wrong_start no_localisation",
+    "navigation": """small_inflation small_footprint no_collision_monitor stale_costmap blind_costmap
+        blind_planner coarse_goal no_recovery hasty_controller""",
+    "manipulation": """weak_grasp early_gripper early_release shallow_place low_carry approach_offset
+        arm_offset lift_offset""",
 }
+"""Functions of each module of the catalogue, which is imported when one of them is used."""
 
-
-def _name(cls: str) -> str:
-    """Return `mirrored_wheel` of `MirroredWheel`."""
-    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in cls).removeprefix("_")
-
-
-for _module, _classes in _CATALOGUE.items():
-    for _class in _classes:
-        MUTANTS.register(_name(_class), f"twin.experiments.mutants.catalogue.{_module}:{_class}")
+for _module, _names in _CATALOGUE.items():
+    for _name in _names.split():
+        MUTANTS.register(_name, f"twin.experiments.mutants.catalogue.{_module}:{_name}")

@@ -8,141 +8,115 @@ from dataclasses import replace
 from typing import Any
 
 from twin.bridge.conversions import twist_from_planar
-from twin.experiments.mutants.mutant import Mutant, Site
+from twin.experiments.mutants.catalogue import edits, installs, rewrites
+from twin.experiments.mutants.mutant import Site
 from twin.models.specs import DriveSpec
 from twin.sim.robot import RobotHandle
 
 
-class MirroredWheel(Mutant):
+@installs
+def mirrored_wheel(site: Site) -> None:
     """The motors of the right wheels turn the wrong way."""
-
-    def install(self, site: Site) -> None:
-        """Reverse the commands."""
-        for robot, drive in site.drives():
-            _rewire(site, robot, {joint: (joint, -1.0) for joint in drive.right_joints})
+    for robot, drive in site.drives():
+        _rewire(site, robot, {joint: (joint, -1.0) for joint in drive.right_joints})
 
 
-class SwappedWheels(Mutant):
+@installs
+def swapped_wheels(site: Site) -> None:
     """The cables of the left and the right motors are swapped."""
-
-    def install(self, site: Site) -> None:
-        """Command the other side."""
-        for robot, drive in site.drives():
-            pairs = list(zip(drive.left_joints, drive.right_joints, strict=False))
-            _rewire(site, robot, {one: (other, 1.0) for a, b in pairs for one, other in ((a, b), (b, a))})
+    for robot, drive in site.drives():
+        pairs = list(zip(drive.left_joints, drive.right_joints, strict=False))
+        _rewire(site, robot, {one: (other, 1.0) for a, b in pairs for one, other in ((a, b), (b, a))})
 
 
-class MirroredEncoder(Mutant):
+@installs
+def mirrored_encoder(site: Site) -> None:
     """The encoder of a right wheel counts backwards."""
-
-    def install(self, site: Site) -> None:
-        """Misread one."""
-        for robot, drive in site.drives():
-            robot.hardware.misread(drive.right_joints[0], -1.0)
+    for robot, drive in site.drives():
+        robot.hardware.misread(drive.right_joints[0], -1.0)
 
 
-class WheelRadiusOff(Mutant):
+@installs
+def wheel_radius_off(site: Site) -> None:
     """The robot takes its wheels to be 5 % larger than they are."""
-
-    def install(self, site: Site) -> None:
-        """Change what the nodes know."""
-        _respecify(site, lambda drive: replace(drive, wheel_radius=1.05 * drive.wheel_radius))
+    _respecify(site, lambda drive: replace(drive, wheel_radius=1.05 * drive.wheel_radius))
 
 
-class TrackOff(Mutant):
+@installs
+def track_off(site: Site) -> None:
     """The robot takes its wheels to be 10 % farther apart than they are."""
-
-    def install(self, site: Site) -> None:
-        """Change what the nodes know."""
-        _respecify(site, lambda drive: replace(drive, wheel_separation=1.1 * drive.wheel_separation))
+    _respecify(site, lambda drive: replace(drive, wheel_separation=1.1 * drive.wheel_separation))
 
 
-class LostBrake(Mutant):
+@installs
+def lost_brake(site: Site) -> None:
     """The drive hardly brakes: commands get slower by no more than 0.15 m/s²."""
+    speed = 0.0
 
-    def install(self, site: Site) -> None:
-        """Hold speeds up, by the time between commands of one tick."""
-        speed = 0.0
+    def coasting(message: Any) -> Any:
+        nonlocal speed
+        wanted = message.linear.x
+        slowest = abs(speed) - 0.15 * 0.02  # of the time between commands: a tick
+        if abs(wanted) < slowest:
+            wanted = slowest if speed > 0.0 else -slowest
+        speed = wanted
+        return twist_from_planar(speed, message.angular.z)
 
-        def coasting(message: Any) -> Any:
-            nonlocal speed
-            wanted = message.linear.x
-            slowest = abs(speed) - 0.15 * 0.02
-            if abs(wanted) < slowest:
-                wanted = slowest if speed > 0.0 else -slowest
-            speed = wanted
-            return twist_from_planar(speed, message.angular.z)
-
-        site.rewrite("cmd_vel", coasting)
+    site.rewrite("cmd_vel", coasting)
 
 
-class ClippedSpeed(Mutant):
+@rewrites("cmd_vel")
+def clipped_speed(message: Any) -> Any:
     """The drive takes no command above 0.1 m/s."""
-
-    def install(self, site: Site) -> None:
-        """Clip."""
-        site.rewrite("cmd_vel", lambda m: twist_from_planar(min(max(m.linear.x, -0.1), 0.1), m.angular.z))
+    return twist_from_planar(min(max(message.linear.x, -0.1), 0.1), message.angular.z)
 
 
-class DoubledCommands(Mutant):
+@rewrites("cmd_vel")
+def doubled_commands(message: Any) -> Any:
     """The drive does twice what it is told."""
-
-    def install(self, site: Site) -> None:
-        """Double."""
-        site.rewrite("cmd_vel", lambda m: twist_from_planar(2.0 * m.linear.x, 2.0 * m.angular.z))
+    return twist_from_planar(2.0 * message.linear.x, 2.0 * message.angular.z)
 
 
-class LateCommands(Mutant):
+@edits
+def late_commands(data: dict[str, Any]) -> None:
     """Commands reach the motors 0.4 s late."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Change the latency of all robots."""
-        for robot in data["robots"]:
-            robot["command_latency"] = "0.4 s"
+    for robot in data["robots"]:
+        robot["command_latency"] = "0.4 s"
 
 
-class LateOdometry(Mutant):
+@installs
+def late_odometry(site: Site) -> None:
     """Odometry comes 0.5 s late, with stamps as if it were fresh."""
-
-    def install(self, site: Site) -> None:
-        """Give each message the pose of 25 messages before."""
-        poses: deque[Any] = deque(maxlen=25)
-
-        def late(message: Any) -> Any:
-            poses.append((message.pose, message.twist))
-            return replace(message, pose=poses[0][0], twist=poses[0][1])
-
-        site.rewrite("odom", late)
-        transforms: deque[Any] = deque(maxlen=25)
-
-        def late_tf(message: Any) -> Any:
-            transforms.append([each.transform for each in message.transforms])
-            pairs = zip(message.transforms, transforms[0], strict=True)
-            return replace(message, transforms=[replace(each, transform=old) for each, old in pairs])
-
-        site.rewrite("tf", late_tf, node="diff_drive_controller")
+    _stale_odometry(site, 25)
 
 
-class FrozenOdometry(Mutant):
+@installs
+def frozen_odometry(site: Site) -> None:
     """Odometry says that the robot stands where it started."""
+    _stale_odometry(site, None)
 
-    def install(self, site: Site) -> None:
-        """Keep the first pose."""
-        first: list[Any] = []
 
-        def frozen(message: Any) -> Any:
-            first.append(message) if not first else None
-            return replace(message, pose=first[0].pose, twist=first[0].twist)
+def _stale_odometry(site: Site, late: int | None) -> None:
+    """Let odometry and its transform say what they said so many messages ago; None: in the first one."""
 
-        site.rewrite("odom", frozen)
-        transforms: list[Any] = []
+    def stale(kept: deque[Any], message: Any) -> Any:
+        if late is not None or not kept:
+            kept.append(message)
+        return kept[0]
 
-        def frozen_tf(message: Any) -> Any:
-            transforms.append(message) if not transforms else None
-            pairs = zip(message.transforms, transforms[0].transforms, strict=True)
-            return replace(message, transforms=[replace(new, transform=old.transform) for new, old in pairs])
+    def stale_odom(message: Any) -> Any:
+        old = stale(messages, message)
+        return replace(message, pose=old.pose, twist=old.twist)
 
-        site.rewrite("tf", frozen_tf, node="diff_drive_controller")
+    messages, transforms = deque[Any](maxlen=late), deque[Any](maxlen=late)
+    site.rewrite("odom", stale_odom)
+    site.rewrite("tf", lambda m: with_transforms(m, stale(transforms, m)), node="diff_drive_controller")
+
+
+def with_transforms(message: Any, old: Any) -> Any:
+    """Return a TFMessage that has its own stamps and the transforms of another."""
+    pairs = zip(message.transforms, old.transforms, strict=True)
+    return replace(message, transforms=[replace(new, transform=old.transform) for new, old in pairs])
 
 
 def _rewire(site: Site, robot: RobotHandle, wires: Mapping[str, tuple[str, float]]) -> None:

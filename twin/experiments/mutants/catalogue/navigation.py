@@ -5,99 +5,82 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from twin.experiments.mutants.mutant import Mutant, NotHere, Site
+from twin.experiments.mutants.catalogue import edits, installs
+from twin.experiments.mutants.mutant import NotHere, Site
 from twin.runtime.defaults import from_description
 
 
-class SmallInflation(Mutant):
+@edits
+def small_inflation(data: dict[str, Any]) -> None:
     """Obstacles are hardly inflated: paths touch them."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Change both costmaps."""
-        for navigation in navigating(data):
-            for name in ("global_costmap", "local_costmap"):
-                group(navigation, name).update(inflation_radius="5 cm", cost_scaling_factor=100.0)
+    for navigation in navigating(data):
+        for name in ("global_costmap", "local_costmap"):
+            group(navigation, name).update(inflation_radius="5 cm", cost_scaling_factor=100.0)
 
 
-class SmallFootprint(Mutant):
+@installs
+def small_footprint(site: Site) -> None:
     """The robot takes itself to be half as long and wide as it is."""
-
-    def install(self, site: Site) -> None:
-        """Change what navigation is told."""
-        real = from_description.footprint
-        site.patch(from_description, "footprint", lambda *args, **options: 0.5 * real(*args, **options))
+    real = from_description.footprint
+    site.patch(from_description, "footprint", lambda *args, **options: 0.5 * real(*args, **options))
 
 
-class NoCollisionMonitor(Mutant):
+@edits
+def no_collision_monitor(data: dict[str, Any]) -> None:
     """Nobody looks at commands that lead into obstacles."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Leave it out."""
-        for navigation in navigating(data):
-            group(navigation, "collision_monitor")["enabled"] = False
+    for navigation in navigating(data):
+        group(navigation, "collision_monitor")["enabled"] = False
 
 
-class StaleCostmap(Mutant):
+@edits
+def stale_costmap(data: dict[str, Any]) -> None:
     """The costmap around the robot is made anew only every 5 s."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Change its rate."""
-        for navigation in navigating(data):
-            group(navigation, "local_costmap")["update_frequency"] = "0.2 Hz"
+    for navigation in navigating(data):
+        group(navigation, "local_costmap")["update_frequency"] = "0.2 Hz"
 
 
-class BlindCostmap(Mutant):
+@edits
+def blind_costmap(data: dict[str, Any]) -> None:
     """No costmap takes in what the lidar sees."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Leave the layer out."""
-        for navigation in navigating(data):
-            group(navigation, "global_costmap")["plugins"] = ["static_layer", "inflation_layer"]
-            group(navigation, "local_costmap")["plugins"] = ["inflation_layer"]
+    for navigation in navigating(data):
+        group(navigation, "global_costmap")["plugins"] = ["static_layer", "inflation_layer"]
+        group(navigation, "local_costmap")["plugins"] = ["inflation_layer"]
 
 
-class BlindPlanner(Mutant):
+@edits
+def blind_planner(data: dict[str, Any]) -> None:
     """Paths are planned without the map."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Leave the layer out."""
-        for navigation in navigating(data):
-            group(navigation, "global_costmap")["plugins"] = ["inflation_layer"]
+    for navigation in navigating(data):
+        group(navigation, "global_costmap")["plugins"] = ["inflation_layer"]
 
 
-class CoarseGoal(Mutant):
+@edits
+def coarse_goal(data: dict[str, Any]) -> None:
     """Half a metre and 60 degrees before its goal the robot takes itself to be there."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Change the goal checker."""
-        for navigation in navigating(data):
-            group(navigation, "controller").update(xy_goal_tolerance="0.5 m", yaw_goal_tolerance="60 deg")
+    for navigation in navigating(data):
+        group(navigation, "controller").update(xy_goal_tolerance="0.5 m", yaw_goal_tolerance="60 deg")
 
 
-class NoRecovery(Mutant):
+@edits
+def no_recovery(data: dict[str, Any]) -> None:
     """A robot that is stuck does nothing about it."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Take a tree without recoveries, and no moves to and fro."""
-        for navigation in navigating(data):
-            group(navigation, "controller")["maneuvers"] = False
-            group(navigation, "navigator")["default_nav_to_pose_bt_xml"] = "navigate_w_replanning"
+    for navigation in navigating(data):
+        group(navigation, "controller")["maneuvers"] = False
+        group(navigation, "navigator")["default_nav_to_pose_bt_xml"] = "navigate_w_replanning"
 
 
-class HastyController(Mutant):
+@edits
+def hasty_controller(data: dict[str, Any]) -> None:
     """The controller cuts curves at full speed, and looks for no collision."""
-
-    def edit(self, data: dict[str, Any]) -> None:
-        """Change its parameters."""
-        for navigation in navigating(data):
-            group(navigation, "controller").update(
-                use_regulated_linear_velocity_scaling=False,
-                use_cost_regulated_linear_velocity_scaling=False,
-                use_collision_detection=False,
-                lookahead_dist="1.5 m",
-                min_lookahead_dist="1.5 m",
-                max_lookahead_dist="1.5 m",
-            )
+    for navigation in navigating(data):
+        group(navigation, "controller").update(
+            use_regulated_linear_velocity_scaling=False,
+            use_cost_regulated_linear_velocity_scaling=False,
+            use_collision_detection=False,
+            lookahead_dist="1.5 m",
+            min_lookahead_dist="1.5 m",
+            max_lookahead_dist="1.5 m",
+        )
 
 
 def navigating(data: dict[str, Any]) -> Iterator[dict[str, Any]]:

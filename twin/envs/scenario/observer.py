@@ -10,12 +10,7 @@ from gymnasium import spaces
 
 from twin.envs.scenario.agents.agent import Agent, Values
 from twin.envs.scenario.episode import Episode, Heard
-from twin.envs.scenario.observations.channel import Channel
-from twin.envs.scenario.observations.costmap import Costmap
-from twin.envs.scenario.observations.odometry import Odometry
-from twin.envs.scenario.observations.pose import PoseInMap
-from twin.envs.scenario.observations.poses import Poses
-from twin.envs.scenario.observations.scan import Scan
+from twin.envs.scenario.observations import Channel, Costmap, Odometry, PoseInMap, Poses, Scan
 from twin.errors import GymError
 
 OLDEST_S = 10.0
@@ -48,9 +43,10 @@ class Observer:
             GymError: A topic that is not there, or whose type nothing shows.
         """
         self._episode, self._agent = episode, agent
-        self.channels: tuple[Channel, ...] = tuple(
-            each if isinstance(each, Channel) else channel_of(each, episode)
-            for each in (usual(episode, agent) if wanted is None else wanted)
+        if wanted is None:
+            wanted = [topic for topic in agent.observes if episode.publishes(topic)]
+        self.channels = tuple(
+            each if isinstance(each, Channel) else _channel_of(each, episode) for each in wanted
         )
         keys = [channel.key for channel in self.channels]
         for key in {*keys, "age", *agent.observation_spaces()}:
@@ -77,12 +73,7 @@ class Observer:
         return {key: _within(found.get(key), box) for key, box in self.space.spaces.items()}
 
 
-def usual(episode: Episode, agent: Agent) -> list[str]:
-    """Return the topics that an agent of this kind is shown, as far as the robot has them."""
-    return [topic for topic in agent.observes if episode.publishes(topic)]
-
-
-def channel_of(topic: str, episode: Episode) -> Channel:
+def _channel_of(topic: str, episode: Episode) -> Channel:
     """Return what shows a topic of which only the name is given.
 
     Raises:
