@@ -51,6 +51,7 @@ def test_without_a_seed_the_first_run_is_the_files(make: MakeEnv, small: Path) -
 
 
 @pytest.mark.long
+@pytest.mark.timeout(900)
 def test_a_thousand_runs_begin_alike_and_leave_nothing(make: MakeEnv, small: Path) -> None:
     env = make(small)
     seeds = {seed: first_of(env, seed) for seed in range(5)}

@@ -35,8 +35,8 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None, *, short: bo
     table = Table(title=f"{verdict['scenario']}, seed {verdict['seed']}", title_justify="left", box=None)
     table.add_column("")
     table.add_column("check", max_width=_LONGEST if short else None)
-    for name in ("value", "limit", "margin", "at"):
-        table.add_column(name, justify="right", no_wrap=True)
+    for column in ("value", "limit", "margin", "at"):
+        table.add_column(column, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
         name = Text(check["name"], no_wrap=True, overflow="ellipsis")
