@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -14,6 +15,10 @@ from hypothesis import settings
 from tests.processes import free_endpoint
 
 os.environ["PYTHONPATH"] = str(Path(__file__).parents[1])
+
+# Where this is set, every process would compile every module, and pytest rewrite every test, anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 if "TWIN_CACHE" not in os.environ:  # the processes that tests start, and pytest-xdist's, have the same one
     os.environ["TWIN_CACHE"] = tempfile.mkdtemp(prefix="twin-cache-")

@@ -25,7 +25,7 @@ def free_endpoint(protocol: str = "tcp") -> str:
     raise OSError("no port is free")
 
 
-def wait_for(condition: Callable[[], object], seconds: float = 20.0) -> None:
+def wait_for(condition: Callable[[], object], seconds: float = 100.0) -> None:
     """Poll for what another process or thread does."""
     deadline = time.monotonic() + seconds
     while not condition():
@@ -33,7 +33,7 @@ def wait_for(condition: Callable[[], object], seconds: float = 20.0) -> None:
         time.sleep(POLL_S)
 
 
-def wait_for_listener(endpoint: str, seconds: float = 60.0) -> None:
+def wait_for_listener(endpoint: str, seconds: float = 100.0) -> None:
     """Wait until somebody listens there."""
     host, _, port = endpoint.removeprefix("tcp/").partition(":")
 

@@ -59,8 +59,8 @@ def test_one_file_in_process_and_in_lock_step(twin: Twin, endpoint: str) -> None
     alone = twin(*run, "1", "--node", f"{NODES}:controller")
     node = twin("exec", f"{NODES}:controller", "--lockstep", "--connect", endpoint)
     stepped = twin(*run, "2", "--wait-for", "/controller", "--listen", endpoint, "--wait-timeout", "60")
-    verdicts = [json.loads(process.communicate(timeout=60)[0]) for process in (alone, stepped)]
-    assert (alone.returncode, stepped.returncode, node.wait(10)) == (0, 0, 0)
+    verdicts = [json.loads(process.communicate(timeout=120)[0]) for process in (alone, stepped)]
+    assert (alone.returncode, stepped.returncode, node.wait(100)) == (0, 0, 0)
     assert verdicts[0]["digest"] == verdicts[1]["digest"] is not None
     assert [verdict["clock"] for verdict in verdicts] == ["inproc", "lockstep"]
 
@@ -78,28 +78,17 @@ def test_a_node_that_never_comes_is_an_error(twin: Twin, endpoint: str, tmp_path
         "--wait-timeout",
         "0.1",
     )
-    _, errors = run.communicate(timeout=60)
+    _, errors = run.communicate(timeout=120)
     assert run.returncode == 2
     assert errors.startswith("error: no node /brain has joined within 0.1 s; start its process")
     verdict = json.loads((tmp_path / "o" / "verdict.json").read_text(encoding="utf-8"))
     assert (verdict["verdict"], verdict["clock"], verdict["digest"]) == ("error", "lockstep", None)
 
 
-def test_a_misspelt_node_is_told_beside_what_has_joined(twin: Twin, endpoint: str) -> None:
-    node = twin("exec", f"{NODES}:controller", "--lockstep", "--connect", endpoint)
-    waits = ("--wait-for", "/controller", "--wait-for", "/controler", "--wait-timeout", "8")
-    run = twin("run", "driven.yaml", "--no-record", "--out", "o", "--listen", endpoint, *waits)
-    _, errors = run.communicate(timeout=60)
-    assert run.returncode == 2
-    assert errors.rstrip().endswith("; what has joined: /controller")
-    assert "error: no node /controler has joined within 8 s" in errors
-    node.wait(10)
-
-
 def test_free_running_is_labelled(twin: Twin, endpoint: str) -> None:
     run = twin("run", "driven.yaml", "--no-record", "--out", "o", "--free", "--listen", endpoint)
     node = twin("exec", f"{NODES}:controller", "--connect", endpoint, "--use-sim-time")
-    table, _ = run.communicate(timeout=60)
+    table, _ = run.communicate(timeout=120)
     assert "clock free" in table
     assert "not deterministic" in table
     assert node.poll() in (None, 2), "2: the run was over before the node came"
@@ -122,6 +111,6 @@ def test_one_ends_the_other(
     run = twin("run", "driven.yaml", "--no-record", "--out", "o", *words, duration="60 s")
     wait_for((tmp_path / "sign").exists, 60.0)
     (run if who == "run" else node).send_signal(number)
-    errors = run.communicate(timeout=20)[1] + node.communicate(timeout=20)[1]
+    errors = run.communicate(timeout=120)[1] + node.communicate(timeout=120)[1]
     assert "Traceback" not in errors
     assert (run.returncode, node.returncode) == codes, errors

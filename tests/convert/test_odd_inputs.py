@@ -89,7 +89,7 @@ def _reading(case: Case) -> tuple[str, ...]:
 @pytest.mark.parametrize("name", [name for name in CASES if CASES[name].model is not None])
 def test_check_urdf_refuses_no_more(name: str, tmp_path: Path) -> None:
     file = write(CASES[name], tmp_path)
-    done = subprocess.run([str(CHECK_URDF), str(file)], capture_output=True, check=False, timeout=60)
+    done = subprocess.run([str(CHECK_URDF), str(file)], capture_output=True, check=False, timeout=120)
     assert (done.returncode != 0) == (name in ONLY_CHECK_URDF_REFUSES)
 
 

@@ -41,7 +41,7 @@ class Program:
         with self._changed:
             return re.sub(r"\[\d+\.\d+\] ", "", "".join(self._lines))
 
-    def wait_for(self, text: str, timeout_s: float = 20.0) -> None:
+    def wait_for(self, text: str, timeout_s: float = 100.0) -> None:
         """Wait until it has printed a text."""
         deadline = time.monotonic() + timeout_s
         with self._changed:
@@ -50,7 +50,7 @@ class Program:
                 assert left > 0.0, f"{text!r} was not printed, but {''.join(self._lines)!r}"
                 self._changed.wait(min(left, 0.1))
 
-    def finish(self, timeout_s: float = 20.0) -> int:
+    def finish(self, timeout_s: float = 100.0) -> int:
         """Wait for its end."""
         code = self.process.wait(timeout_s)
         self._reader.join()

@@ -92,7 +92,7 @@ def test_a_robot_drives_where_an_action_of_our_own_sends_it(start: Start, endpoi
     server = start("move_base_server", "--speed", "1.0")
     types.add_folder(ROOT / "examples" / "interfaces")
     MoveBase = types.ActionType("course_interfaces/action/MoveBase")
-    with live.join([endpoint], timeout_s=20.0) as process:
+    with live.join([endpoint], timeout_s=100) as process:
         robot = Robot(process.bus)
         client = ActionClient(robot.node, MoveBase, "move_base")
         feedback: list[PoseStamped] = []
@@ -103,7 +103,7 @@ def test_a_robot_drives_where_an_action_of_our_own_sends_it(start: Start, endpoi
             return client.send_goal(MoveBase.Goal(target), lambda news: feedback.append(news.base_position))
 
         def wait(condition: Callable[[], bool]) -> None:
-            assert process.spin(condition, timeout_s=20.0), server.text
+            assert process.spin(condition, timeout_s=100), server.text
 
         wait(lambda: client.server_is_ready)
         goal = send(0.3, 0.4)

@@ -36,7 +36,7 @@ def test_a_full_disk_is_told_and_not_waited_for(tmp_path: Path) -> None:
     """Rerun's writer ends with its first failure, and its words are coloured in a pipe, too."""
     path = tmp_path / "a.rrd"
     done = subprocess.run(
-        [sys.executable, "-c", _FULL, str(path)], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", _FULL, str(path)], capture_output=True, text=True, check=False, timeout=120
     )
     said = done.stdout.splitlines()
     assert set(said) == {f"{path}: the recording could not be written to its end; is the disk full?"}

@@ -38,6 +38,8 @@ def main() -> None:
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     arrived: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
     with connected(config) as session:
         session.declare_subscriber(ODOM, lambda sample: arrived.put(sample.payload.to_bytes()))
         sequence = 0
@@ -53,7 +55,7 @@ def main() -> None:
 
 
 def connected(config: zenoh.Config) -> zenoh.Session:
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 100
     while True:
         try:
             return zenoh.open(config)

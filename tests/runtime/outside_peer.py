@@ -70,7 +70,7 @@ def main() -> None:
     with session:
         session.declare_subscriber(ODOM, on_odom)
         session.declare_subscriber(CLOCK, on_clock)
-        begun.wait(30.0)  # the run listens before it is built
+        begun.wait(100)  # the run listens before it is built
         end = time.monotonic() + float(sys.argv[2])
         sequence = 0
         while time.monotonic() < end:
@@ -86,7 +86,7 @@ def main() -> None:
 
 
 def connected(config: zenoh.Config) -> zenoh.Session:
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 100
     while True:
         try:
             return zenoh.open(config)

@@ -1,6 +1,6 @@
 """A process that no run waits for: it listens, asks, and interferes until the run is over.
 
-Argument: endpoint. Prints one line of JSON.
+Argument: endpoint. Prints "ready" when it listens, and one line of JSON.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from twin.errors import BridgeError
 
 
 def main() -> None:
-    end = time.monotonic() + 30
+    end = time.monotonic() + 100
     while True:
         try:
             with live.join([sys.argv[1]]) as process:
@@ -38,6 +38,8 @@ def watch(process: live.LiveBus, end: float) -> dict[str, object]:
     node.create_subscription(Twist, "/cmd_vel", commands.append)
     publisher = node.create_publisher(Twist, "/cmd_vel")
     graph = Graph.watch(process.bus)
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
     process.spin(lambda: bool(odometry), timeout_s=end - time.monotonic())
     names = [info.full_name for info in graph.nodes]
     base = names[0]

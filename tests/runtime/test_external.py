@@ -41,8 +41,8 @@ def test_another_process_drives_the_robot_and_listens(tmp_path: Path, endpoint: 
     )
     peer = subprocess.Popen([sys.executable, str(PEER), endpoint, "3"], stdout=subprocess.PIPE, text=True)
     try:
-        heard = json.loads(peer.communicate(timeout=60)[0])
-        verdict = json.loads(run.communicate(timeout=60)[0])
+        heard = json.loads(peer.communicate(timeout=120)[0])
+        verdict = json.loads(run.communicate(timeout=120)[0])
     finally:
         for process in (peer, run):
             process.kill()
@@ -78,7 +78,7 @@ def test_without_listen_the_same_run_stands_still_and_is_deterministic(tmp_path:
         capture_output=True,
         text=True,
         cwd=tmp_path,
-        timeout=60,
+        timeout=120,
         check=False,
     )
     verdict = json.loads(done.stdout)

@@ -195,7 +195,7 @@ def test_debians_rosbag_reads_what_convert_writes(tmp_path: Path) -> None:
     )
     done = subprocess.run(
         [tool, "info", "--yaml", str(tmp_path / "a.bag")],
-        capture_output=True, text=True, check=False, timeout=60, env={"PATH": "/usr/bin:/bin"},
+        capture_output=True, text=True, check=False, timeout=120, env={"PATH": "/usr/bin:/bin"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     import yaml

@@ -24,7 +24,7 @@ def both(run: Bus, process: live.LiveBus, until: Any) -> None:
         run.spin()
         return bool(until())
 
-    assert process.spin(until=step, timeout_s=20)
+    assert process.spin(until=step, timeout_s=100)
 
 
 def forever(handle: GoalHandle) -> Generator[None, None, Any]:

@@ -39,7 +39,7 @@ def publish(port: str) -> None:
     publisher = ROS2Publisher("/chatter", name, text, node_name="sdk", type_hash=type_hash, **where(port))
     twists = ROS2Publisher("/cmd_vel", TWIST[0], TWIST[1], node_name="sdk", type_hash=TWIST[2], **where(port))
     vector = twists.session_mgr.store.types["geometry_msgs/msg/Vector3"]
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 100
     while not (publisher.pub.matching_status.matching and twists.pub.matching_status.matching):
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -65,7 +65,7 @@ def subscribe(port: str) -> None:
         **where(port),
     )
     say(ready=True)
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 100
     while not heard:
         assert time.monotonic() < deadline
         time.sleep(0.01)

@@ -40,7 +40,7 @@ def open_session(endpoint: str) -> zenoh.Session:
 
 
 def until_there(session: zenoh.Session, kind: str) -> None:
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 100
     while not list(session.liveliness().get(f"@ros2_lv/0/*/*/*/{kind}/**")):
         assert time.monotonic() < deadline, f"no {kind}"
 

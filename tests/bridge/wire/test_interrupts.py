@@ -48,7 +48,7 @@ def _interrupt(process: subprocess.Popen[str], delay_s: float) -> tuple[int, str
     except subprocess.TimeoutExpired:
         process.send_signal(signal.SIGINT)
     try:
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=120)
     except subprocess.TimeoutExpired:
         process.kill()
         process.communicate()

@@ -218,7 +218,7 @@ def test_any_topic_of_any_wire_as_bytes(endpoint: str, wire: Wire, topic: str) -
         wait_for(lambda: publisher.has_subscribers)
         wait_for(lambda: Graph.snapshot(process.bus).publishers("/chatter"))
         publisher.publish(String("hi"))
-        assert process.spin(until=lambda: bool(got), timeout_s=10)
+        assert process.spin(until=lambda: bool(got), timeout_s=100)
         (sample,) = got
         assert (sample.topic, sample.type, sample.payload) == (
             "/chatter",

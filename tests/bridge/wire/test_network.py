@@ -34,7 +34,7 @@ def test_another_process_drives(open_bus: Bus, endpoint: str) -> None:
     got: list[float] = []
     node.create_subscription(Twist, "cmd_vel", lambda m: got.append(m.linear.x))
     with _peer(endpoint, "send") as peer:
-        assert peer.wait(20) == 0
+        assert peer.wait(100) == 0
     open_bus.spin()
     assert got == []  # nothing enters between admissions
     wait_for(lambda: open_bus.external.waiting == 3)
@@ -58,7 +58,7 @@ def test_garbage_from_outside_is_counted_and_reported(
         return got == [7.0] and sum(open_bus.refused.values()) == 7
 
     with _peer(endpoint, "garbage") as peer:
-        assert peer.wait(20) == 0
+        assert peer.wait(100) == 0
         wait_for(step)
     open_bus.admit()
     assert dict(open_bus.refused) == {"attachment": 2, "payload": 3, "type hash": 1, "type": 1}
@@ -153,7 +153,7 @@ def test_nothing_listens_by_default() -> None:
     )
     if not Path("/proc/self/fd").exists():
         pytest.skip("needs /proc")
-    assert subprocess.run([sys.executable, "-c", script], timeout=60, check=False).returncode == 0
+    assert subprocess.run([sys.executable, "-c", script], timeout=120, check=False).returncode == 0
 
 
 @pytest.mark.parametrize("listen", [True, False])
@@ -170,6 +170,6 @@ def test_a_forgotten_bus_does_not_hang_the_interpreter(listen: bool, endpoint: s
         "node.create_publisher(String, 'y', LATCHED).publish(String('z'))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script], timeout=60, check=False, capture_output=True, text=True
+        [sys.executable, "-c", script], timeout=120, check=False, capture_output=True, text=True
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -179,7 +179,7 @@ def test_the_map_of_a_graph_is_saved(tmp_path: Path) -> None:
 
         def save(*arguments: str) -> subprocess.CompletedProcess[str]:
             return subprocess.run(
-                [*command, *arguments], capture_output=True, text=True, cwd=root, check=False, timeout=60
+                [*command, *arguments], capture_output=True, text=True, cwd=root, check=False, timeout=120
             )
 
         done = save("-f", str(tmp_path / "saved"), "--fmt", "png")

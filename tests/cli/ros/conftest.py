@@ -39,7 +39,7 @@ def endpoint(request: pytest.FixtureRequest) -> Iterator[str]:
 def twin(endpoint: str) -> Twin:
     """Run `twin …` in a process of its own, connected to the graph."""
 
-    def run(*arguments: str, timeout: float = 30.0) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: str, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "twin.cli", *arguments, "--connect", endpoint]
         return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
 

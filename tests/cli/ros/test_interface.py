@@ -53,7 +53,7 @@ def run(*arguments: str, given: str = "", **environment: str) -> subprocess.Comp
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
         check=False,
     )
 

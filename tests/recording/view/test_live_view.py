@@ -136,6 +136,6 @@ def test_the_command_ends_cleanly_and_takes_its_viewer_along() -> None:
             viewers = children.read_text().split() if children.exists() else []
         finally:
             twin.terminate()
-        rest, _ = twin.communicate(timeout=30)
+        rest, _ = twin.communicate(timeout=120)
     assert (twin.returncode, first, rest) == (0, f"open http://127.0.0.1:{port}/\n", "")
     assert [pid for pid in viewers if Path(f"/proc/{pid}").exists()] == []

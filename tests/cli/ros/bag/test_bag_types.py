@@ -30,7 +30,7 @@ def test_a_type_that_only_its_publisher_knows_is_in_the_bag(endpoint: str, tmp_p
     ) as process:
         wait_for(lambda: any(file.stat().st_size > 4000 for file in bag.glob("*.mcap")))
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=120)
     assert "definition" not in errors
     with BagReader(bag) as reader:
         assert reader.topics["/robot/gps"].definition == "string name\nfloat64 x\nfloat64[2] position\n"

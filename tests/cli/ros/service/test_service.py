@@ -114,7 +114,7 @@ def test_a_call_without_values_sends_defaults_and_takes_the_short_type(twin_here
 
 def test_a_request_is_read_from_standard_input(endpoint: str) -> None:
     command = [sys.executable, "-m", "twin.cli", "service", "call", *ADD, "--stdin", "--connect", endpoint]
-    done = subprocess.run(command, input="a: 4\nb: 5\n", capture_output=True, text=True, timeout=30)
+    done = subprocess.run(command, input="a: 4\nb: 5\n", capture_output=True, text=True, timeout=120)
     assert "AddTwoInts_Response(sum=9)" in done.stdout
 
 
@@ -160,7 +160,7 @@ def test_a_rate_repeats_the_call_until_ctrl_c(endpoint: str) -> None:
             assert line, process.communicate()
             responses += line.startswith("example_interfaces.srv.AddTwoInts_Response(sum=0)")
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=120)
     assert process.returncode == 130
     assert errors == ""
 

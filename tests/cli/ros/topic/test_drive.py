@@ -35,7 +35,7 @@ def twin(*arguments: str) -> Iterator[subprocess.Popen[str]]:
             yield process
         finally:
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=60)
+            process.communicate(timeout=120)
 
 
 def positions(echo: subprocess.Popen[str]) -> Iterator[tuple[float, float]]:
