@@ -48,9 +48,7 @@ class Side:
 
 
 def of_path(
-    path: str | Path,
-    overrides: Overrides = NO_OVERRIDES,
-    progress: Callable[[Progress], None] | None = None,
+    path: str | Path, overrides: Overrides = NO_OVERRIDES, progress: Callable[[Progress], None] | None = None
 ) -> Side:
     """Return the run that a path means.
 
@@ -74,9 +72,7 @@ def of_path(
 
 
 def made_again(
-    side: Side,
-    overrides: Overrides = NO_OVERRIDES,
-    progress: Callable[[Progress], None] | None = None,
+    side: Side, overrides: Overrides = NO_OVERRIDES, progress: Callable[[Progress], None] | None = None
 ) -> Side:
     """Return the same run made now, perhaps with changes.
 
@@ -88,8 +84,7 @@ def made_again(
     changes = [f"{key}={value}" for key, value in overrides.items()] or ["now"]
     with execution():
         return Side(
-            name=" ".join([side.name, *changes]),
-            run=_made(side.scenario(overrides), side.outside, progress),
+            name=" ".join([side.name, *changes]), run=_made(side.scenario(overrides), side.outside, progress)
         )
 
 
