@@ -247,11 +247,7 @@ def _checked(given: ArrayLike, *shape: int) -> Array:
 
 
 def _info(outcome: Outcome) -> dict[str, NDArray[Any]]:
-    return {
-        "is_success": outcome.success,
-        "is_collision": outcome.collision,
-        "distance": outcome.distance,
-    }
+    return {"is_success": outcome.success, "is_collision": outcome.collision, "distance": outcome.distance}
 
 
 def _masked(info: dict[str, NDArray[Any]], mask: NDArray[np.bool_] | None = None) -> dict[str, Any]:

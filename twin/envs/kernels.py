@@ -101,10 +101,7 @@ def actuate(
         left, right = (v - w * half) / drive.radius, (v + w * half) / drive.radius
         quickest = max(abs(left), abs(right))
         if quickest > drive.fastest_wheel:
-            left, right = (
-                left * (drive.fastest_wheel / quickest),
-                right * (drive.fastest_wheel / quickest),
-            )
+            left, right = (left * (drive.fastest_wheel / quickest), right * (drive.fastest_wheel / quickest))
         tick, delays = states.tick[i], states.on_the_way.shape[1]
         sent = tick - states.delay[i]
         for k in range(drive.qpos.shape[0]):

@@ -54,12 +54,7 @@ class Randomisation:
 
 
 NONE = Randomisation(
-    mass=0.0,
-    friction=0.0,
-    wheel_radius=0.0,
-    wheel_mismatch=0.0,
-    latency=(0.0, 0.0),
-    lidar_noise=(0.01, 0.01),
+    mass=0.0, friction=0.0, wheel_radius=0.0, wheel_mismatch=0.0, latency=(0.0, 0.0), lidar_noise=(0.01, 0.01)
 )
 """The robot is as its file says; its lidar's noise stays."""
 

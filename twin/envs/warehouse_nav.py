@@ -230,12 +230,7 @@ class WarehouseNavVectorEnv(NavigationVectorEnv):
     """n robots, each in an arena of its own."""
 
     def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        config: WarehouseNavConfig | None = None,
-        threads: int = 0,
-        **options: Any,
+        self, num_envs: int = 1, *, config: WarehouseNavConfig | None = None, threads: int = 0, **options: Any
     ) -> None:
         """Take their number, the threads that share them (0: one for each CPU), and what the base takes."""
         super().__init__(WarehouseNavigation(config or WarehouseNavConfig(), num_envs, threads), **options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from twin.recording.hashes import RunHashes
 
@@ -22,11 +23,6 @@ class Bracket:
         """The earlier of the two."""
         return min((second for second in (self.messages, self.physics) if second is not None), default=None)
 
-    @property
-    def last(self) -> int | None:
-        """The later of the two."""
-        return max((second for second in (self.messages, self.physics) if second is not None), default=None)
-
 
 def bracket(a: RunHashes, b: RunHashes) -> Bracket:
     """Return where the hashes of two runs first differ."""
@@ -43,7 +39,4 @@ def bracket(a: RunHashes, b: RunHashes) -> Bracket:
 
 
 def _first(a: Sequence[int], b: Sequence[int]) -> int | None:
-    for second, (one, other) in enumerate(zip(a, b, strict=False)):
-        if one != other:
-            return second
-    return None if len(a) == len(b) else min(len(a), len(b))
+    return next((i for i, (one, other) in enumerate(zip_longest(a, b)) if one != other), None)

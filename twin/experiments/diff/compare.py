@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -13,11 +13,14 @@ from twin.experiments.diff.bracket import Bracket, bracket
 from twin.experiments.diff.changes import changes, since
 from twin.experiments.diff.difference import PHYSICS, Difference, Divergence, Value
 from twin.experiments.diff.fields import differences
-from twin.experiments.diff.replay import Replay
+from twin.experiments.diff.replay import Message, Replay
 from twin.experiments.diff.side import Side, why_not_alone
 
 if TYPE_CHECKING:
     from twin.runtime import Progress
+
+_Placed = tuple[int, Divergence]
+"""A difference, and where its message is among those of all topics."""
 
 
 def compare(a: Side, b: Side, progress: Callable[[Progress], None] | None = None) -> Difference:
@@ -36,7 +39,7 @@ def compare(a: Side, b: Side, progress: Callable[[Progress], None] | None = None
     if found.first is not None:
         one = _replay(a, found, progress, notes)
         if one.unlike != 0:  # else there is nothing to compare with
-            first = list(_divergences(found, one, _replay(b, found, progress, notes)))
+            first = _divergences(found, one, _replay(b, found, progress, notes))
     elif not same:
         notes.append("the digests differ though no short hash does: one in four thousand million")
     return Difference(
@@ -73,25 +76,16 @@ def _replay(
     return made
 
 
-def _divergences(found: Bracket, a: Replay, b: Replay) -> Iterator[Divergence]:
-    """Yield the first difference of each topic, and of the physics before messages of its time."""
-    physics = _physics(a, b) if a.holds(found.physics) and b.holds(found.physics) else None
-    messages = []
+def _divergences(found: Bracket, a: Replay, b: Replay) -> list[Divergence]:
+    """Return the first difference of each topic, and of the physics before messages of its time."""
+    differ: list[_Placed] = []
+    if a.holds(found.physics) and b.holds(found.physics) and (physics := _physics(a, b)) is not None:
+        differ.append((-1, physics))
     if a.holds(found.messages) and b.holds(found.messages):
-        messages = [each for name in found.topics if (each := _messages(name, a, b)) is not None]
+        differ += filter(None, (_messages(name, a, b) for name in found.topics))
         if not found.topics:
-            messages = list(_order(a, b))
-    if physics is not None:
-        yield from (one for _, one in sorted(messages, key=_place) if one.time_ns < physics.time_ns)
-        yield physics
-    yield from (
-        one for _, one in sorted(messages, key=_place) if physics is None or one.time_ns >= physics.time_ns
-    )
-
-
-def _place(found: tuple[int, Divergence]) -> tuple[int, int]:
-    order, one = found
-    return one.time_ns, order
+            differ += _order(a, b)
+    return [one for _, one in sorted(differ, key=lambda placed: (placed[1].time_ns, placed[0]))]
 
 
 def _physics(a: Replay, b: Replay) -> Divergence | None:
@@ -115,51 +109,41 @@ def _physics(a: Replay, b: Replay) -> Divergence | None:
     return None
 
 
-def _messages(name: str, a: Replay, b: Replay) -> tuple[int, Divergence] | None:
-    topic, _, typename = name.partition(" ")
+def _messages(name: str, a: Replay, b: Replay) -> _Placed | None:
     for one, other in zip_longest(a.messages.get(name, ()), b.messages.get(name, ())):
         if one is None or other is None or one.time_ns != other.time_ns:
             earlier = min(filter(None, (one, other)), key=lambda each: each.time_ns)
             here = ["message" if each is earlier else None for each in (one, other)]
-            found: list[tuple[str, Value, Value]] = [("", here[0], here[1])]
-        elif one.payload != other.payload:
-            earlier = one
+            return _placed(name, earlier, "", *here)
+        if one.payload != other.payload:
+            typename = name.partition(" ")[2]
             found = list(differences(typename, one.payload, other.payload)) or [("padding", None, None)]
-        else:
-            continue
-        field, a_says, b_says = found[0]
-        return earlier.order, Divergence(
-            topic=topic,
-            type=typename,
-            time_ns=earlier.time_ns,
-            tick=earlier.tick,
-            field=field,
-            a=a_says,
-            b=b_says,
-            fields=len(found),
-        )
+            return _placed(name, one, *found[0], fields=len(found))
     return None
 
 
-def _order(a: Replay, b: Replay) -> Iterator[tuple[int, Divergence]]:
-    """Yield the first message that has another one's place."""
+def _order(a: Replay, b: Replay) -> list[_Placed]:
+    """Return the first message that has another one's place, if there is one."""
     one, other = (
         sorted(((m, name) for name, all_ in each.messages.items() for m in all_), key=lambda m: m[0].order)
         for each in (a, b)
     )
     for (message, name), (_, instead) in zip(one, other, strict=False):
         if name != instead:
-            topic, _, typename = name.partition(" ")
-            yield (
-                message.order,
-                Divergence(
-                    topic=topic,
-                    type=typename,
-                    time_ns=message.time_ns,
-                    tick=message.tick,
-                    field="order",
-                    a=topic,
-                    b=instead.partition(" ")[0],
-                ),
-            )
-            return
+            here, there = (each.partition(" ")[0] for each in (name, instead))
+            return [_placed(name, message, "order", here, there)]
+    return []
+
+
+def _placed(name: str, message: Message, field: str, a: Value, b: Value, *, fields: int = 1) -> _Placed:
+    topic, _, typename = name.partition(" ")
+    return message.order, Divergence(
+        topic=topic,
+        type=typename,
+        time_ns=message.time_ns,
+        tick=message.tick,
+        field=field,
+        a=a,
+        b=b,
+        fields=fields,
+    )

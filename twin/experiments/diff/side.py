@@ -74,9 +74,7 @@ def sides(
 
 
 def of_path(
-    path: str | Path,
-    overrides: Overrides = NO_OVERRIDES,
-    progress: Callable[[Progress], None] | None = None,
+    path: str | Path, overrides: Overrides = NO_OVERRIDES, progress: Callable[[Progress], None] | None = None
 ) -> Side:
     """Return the run that a path means.
 
@@ -111,9 +109,7 @@ def _scenario(path: str | Path) -> Path:
 
 
 def made_again(
-    side: Side,
-    overrides: Overrides = NO_OVERRIDES,
-    progress: Callable[[Progress], None] | None = None,
+    side: Side, overrides: Overrides = NO_OVERRIDES, progress: Callable[[Progress], None] | None = None
 ) -> Side:
     """Return the same run made now, perhaps with changes.
 
@@ -125,8 +121,7 @@ def made_again(
     changes = [f"{key}={value}" for key, value in overrides.items()] or ["now"]
     with execution():
         return Side(
-            name=" ".join([side.name, *changes]),
-            run=_made(side.scenario(overrides), side.outside, progress),
+            name=" ".join([side.name, *changes]), run=_made(side.scenario(overrides), side.outside, progress)
         )
 
 

@@ -41,9 +41,14 @@ def table(
     return f'<div class="scroll">{whole}</div>'
 
 
-def cell(text: object) -> str:
-    """Return a cell of text."""
-    return f"<td>{escape(str(text))}</td>"
+def cell(text: object, kind: str = "") -> str:
+    """Return a cell of text, perhaps of a class."""
+    return f'<td class="{kind}">{escape(str(text))}</td>' if kind else f"<td>{escape(str(text))}</td>"
+
+
+def name_cell(text: str) -> str:
+    """Return the cell that says what its row is about."""
+    return f'<th scope="row">{escape(text)}</th>'
 
 
 def badge(word: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from twin.errors import RecordingError, SimulationError
-from twin.experiments.report.html import badge, cell, page, table
+from twin.experiments.report.html import badge, cell, name_cell, page, table
 from twin.experiments.report.told import Moment, Told, read_run
 from twin.files.writing import check_file, write_whole
 from twin.scenario.quantities import seconds
@@ -127,15 +127,8 @@ def _pictures(told: Told, level: str) -> list[str]:
     if series := time_series(told, moments):
         parts += [f"<{level}>Over time</{level}>", f"<figure>{series}</figure>"]
     if told.states:
-        rows = [
-            [
-                "",
-                f"<td class=number>{s.start_s:.2f} s</td>",
-                f"<td class=number>{s.end_s - s.start_s:.2f} s</td>",
-                cell(s.name),
-            ]
-            for s in told.states
-        ]
+        times = [[seconds(time, 2) for time in (s.start_s, s.end_s - s.start_s)] for s in told.states]
+        rows = [["", *map(_number, two), cell(s.name)] for two, s in zip(times, told.states, strict=True)]
         parts.append(f"<{level}>Mission</{level}>")
         parts.append(table("States of the mission", ["from", "lasts", "state"], rows))
     if told.log:
@@ -177,16 +170,11 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
     has_margin = any(check.get("margin") is not None for check in checks)
     rows = []
     for check in checks:
-        mark = ("pass", "✓ holds") if check["passed"] else ("fail", "✗ fails")
         value, limit, margin, at = numbers_of(check)
         numbers = [value, limit, margin, at] if has_margin else [value, limit, at]
-        cells = [
-            f'<td class="mark {mark[0]}">{mark[1]}</td>',
-            f'<th scope="row">{escape(check["name"])}</th>',
-            *(f"<td class=number>{escape(number)}</td>" for number in numbers),
-            cell(check["reason"]),
-        ]
-        rows.append(["" if check["passed"] else "bad", *cells])
+        mark = cell("✓ holds", "mark pass") if check["passed"] else cell("✗ fails", "mark fail")
+        kind = "" if check["passed"] else "bad"
+        rows.append([kind, mark, name_cell(check["name"]), *map(_number, numbers), cell(check["reason"])])
     heads = ["", "check", "value", "limit", *(["margin"] if has_margin else []), "at", "why"]
     return table("Every check must hold for the run to pass", heads, rows)
 
@@ -194,15 +182,10 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> str:
 def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for fault in faults:
-        landed = fault["outcome"] == "landed"
+        kind = "mark pass" if fault["outcome"] == "landed" else "mark fail"
+        mark = cell(fault["outcome"].replace("_", " "), kind)
         times = (seconds(fault[key], 2) for key in ("at_s", "end_s"))
-        cells = [
-            f'<td class="mark {"pass" if landed else "fail"}">{fault["outcome"].replace("_", " ")}</td>',
-            f'<th scope="row">{escape(fault["name"])}</th>',
-            *(f"<td class=number>{time}</td>" for time in times),
-            cell(fault["effect"]),
-        ]
-        rows.append(["", *cells])
+        rows.append(["", mark, name_cell(fault["name"]), *map(_number, times), cell(fault["effect"])])
     heads = ["", "fault", "from", "to", "effect"]
     return table("What was let go wrong, and what came of it where it acted", heads, rows)
 
@@ -217,9 +200,7 @@ def _made_with(verdict: Mapping[str, Any]) -> str:
     rows.append(("versions", ", ".join(f"{name} {version}" for name, version in verdict["versions"].items())))
     rows += [(f"plugin {name}", version) for name, version in verdict["plugins"].items()]
     cells = [
-        ["", f'<th scope="row">{escape(name)}</th>', f"<td><code>{escape(str(value))}</code></td>"]
-        for name, value in rows
-        if value
+        ["", name_cell(name), f"<td><code>{escape(str(value))}</code></td>"] for name, value in rows if value
     ]
     says = (
         "Equal files, seed, versions and class of CPU give an equal digest, to the last bit of every message."
@@ -233,26 +214,19 @@ def _moments(told: Told, moments: Iterable[Moment]) -> str:
     rows = []
     for number, moment in enumerate(moments, 1):
         colour = "fail" if moment.bad else "quiet"
-        rows.append(
-            [
-                "",
-                f'<td class="{colour}"><span class="number-mark">{number}</span></td>',
-                f"<td class=number>{moment.time_s:.2f} s</td>",
-                f'<th scope="row">{escape(moment.title)}</th>',
-                cell(moment.text),
-                cell(told.state_at(moment.time_s)),
-            ]
-        )
+        mark = f'<td class="{colour}"><span class="number-mark">{number}</span></td>'
+        said = name_cell(moment.title), cell(moment.text), cell(told.state_at(moment.time_s))
+        rows.append(["", mark, _number(seconds(moment.time_s, 2)), *said])
     return table("", ["", "at", "what", "why", "mission"], rows)
 
 
 def _log(told: Told) -> str:
-    classes = {"WARN": "warn", "ERROR": "fail", "CRITICAL": "fail"}
+    kinds = {"WARN": "warn", "ERROR": "fail", "CRITICAL": "fail"}
     rows = [
         [
             "",
-            f"<td class=number>{line.time_s:.2f} s</td>",
-            f'<td class="{classes.get(line.level, "quiet")}">{line.level}</td>',
+            _number(seconds(line.time_s, 2)),
+            cell(line.level, kinds.get(line.level, "quiet")),
             cell(line.text),
         ]
         for line in told.log[:_MOST_LINES]
@@ -271,10 +245,12 @@ def _row_of_run(told: Told, link: str) -> list[str]:
         title = f'<a href="{link}">{title}</a>'
     return [
         "" if told.word == "pass" else "bad",
-        f'<td class="mark {told.word}">{told.word.upper()}</td>',
+        cell(told.word.upper(), f"mark {told.word}"),
         f'<th scope="row">{title}</th>',
-        f"<td class=number>{verdict['seed']}</td>",
-        f"<td class=number>{seconds(metrics.get('sim_time_s'))}</td>",
-        f"<td class=number>{seconds(metrics.get('wall_time_s'))}</td>",
+        *map(_number, (verdict["seed"], *(seconds(metrics.get(f"{of}_time_s")) for of in ("sim", "wall")))),
         cell(reason),
     ]
+
+
+def _number(text: object) -> str:
+    return cell(text, "number")

@@ -101,12 +101,7 @@ def _case(
     own += [f"{short[key]}={_named(value, i)}" for key, i, value in point]
     overrides = {} if seed is None else {"seed": str(seed)}
     overrides |= {key: as_text(_found(value, file.parent)) for key, _, value in point}
-    return Case(
-        file=file,
-        name=f"{name}[{','.join(own)}]" if own else name,
-        overrides=overrides,
-        tags=tags,
-    )
+    return Case(file=file, name=f"{name}[{','.join(own)}]" if own else name, overrides=overrides, tags=tags)
 
 
 def _check(file: Path, grid: Mapping[str, Sequence[Any]]) -> None:

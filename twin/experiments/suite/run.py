@@ -32,11 +32,7 @@ class Runner:
             time_limit_s: Of a run [s of wall time].
         """
         self._processes: Processes[Job] = Processes(
-            perform,
-            jobs,
-            preload=(perform.__module__,),
-            time_limit_s=time_limit_s,
-            is_last=_has_executed,
+            perform, jobs, preload=(perform.__module__,), time_limit_s=time_limit_s, is_last=_has_executed
         )
 
     def __enter__(self) -> Self:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Sequence
 
 from twin.errors import ScenarioError
 from twin.experiments.suite.cases import Case
 
-_WORD = re.compile(r"\(|\)|[^\s()]+")
+_WORD = re.compile(r"[()]|[^\s()]+")
+_OWN = ("and", "or", "not", "(", ")")
+_GRAMMAR = ast.Expression | ast.BoolOp | ast.boolop | ast.UnaryOp | ast.Not | ast.Name | ast.Load
+"""What Python's own parser may find in an expression; words stand there as names."""
 
 
 def selected(
@@ -51,37 +55,17 @@ def shard_of(text: str) -> tuple[int, int]:
 def expression(text: str, option: str) -> Callable[[Callable[[str], bool]], bool]:
     """Return what tells whether an expression holds, given which words do; raises ScenarioError."""
     words = _WORD.findall(text)
-    wrong = ScenarioError(
-        f"{option} {text}: must be words with and, or, not and brackets, such as 'seed=3 and not slow'"
-    )
-
-    def parse(at: int, level: int) -> tuple[int, Callable[[Callable[[str], bool]], bool]]:
-        """Return where the part of a level (0: or, 1: and, 2: not) ends, and what it means."""
-        if level == 2:
-            if at >= len(words) or words[at] in (")", "and", "or"):
-                raise wrong
-            if words[at] == "not":
-                at, inner = parse(at + 1, 2)
-                return at, lambda holds: not inner(holds)
-            if words[at] == "(":
-                at, inner = parse(at + 1, 0)
-                if at >= len(words) or words[at] != ")":
-                    raise wrong
-                return at + 1, inner
-            word = words[at]
-            return at + 1, lambda holds: holds(word)
-        at, first = parse(at, level + 1)
-        parts = [first]
-        while at < len(words) and words[at] == ("or", "and")[level]:
-            at, part = parse(at + 1, level + 1)
-            parts.append(part)
-        some = (any, all)[level]
-        return at, lambda holds: some(part(holds) for part in parts)
-
-    end, whole = parse(0, 0)
-    if end != len(words):
-        raise wrong
-    return whole
+    names = [word if word in _OWN else f"word_{i}" for i, word in enumerate(words)]
+    try:
+        tree = ast.parse(" ".join(names), mode="eval")
+    except (SyntaxError, MemoryError, RecursionError):
+        tree = ast.parse("0", mode="eval")
+    if not all(isinstance(node, _GRAMMAR) for node in ast.walk(tree)):
+        raise ScenarioError(
+            f"{option} {text}: must be words with and, or, not and brackets, such as 'seed=3 and not slow'"
+        )
+    code, words_of = compile(tree, option, "eval"), dict(zip(names, words, strict=True))
+    return lambda holds: bool(eval(code, {}, {name: holds(word) for name, word in words_of.items()}))
 
 
 def _told(keyword: str, tags: str) -> str:

@@ -32,12 +32,7 @@ class Worker:
     """One worker, as the run sees it."""
 
     def __init__(
-        self,
-        run: Run,
-        state: SharedState,
-        pipes: list[Connection],
-        index: int,
-        stacks: Sequence[RobotStack],
+        self, run: Run, state: SharedState, pipes: list[Connection], index: int, stacks: Sequence[RobotStack]
     ) -> None:
         """Fork.
 
