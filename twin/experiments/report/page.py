@@ -138,7 +138,7 @@ def _pictures(told: Told, level: str) -> list[str]:
 
 def _photos(told: Told, level: str) -> list[str]:
     """Return pictures of the start, of the moments and of the end, or why there are none."""
-    from twin.experiments.report.photos import photo, why_none
+    from twin.experiments.report.photos import photo
 
     if not told.robots:
         return []
@@ -154,7 +154,7 @@ def _photos(told: Told, level: str) -> list[str]:
         try:
             picture = photo(told, told.robots[0], time)
         except SimulationError as fault:
-            return [f'<p class="quiet">{escape(why_none(fault))}</p>']
+            return [f'<p class="quiet">{escape(f"Pictures are left out: {fault}.")}</p>']
         if picture is not None:
             text = escape(f"{time:.2f} s, {name}")
             figures.append(
