@@ -196,10 +196,9 @@ class Told:
         """What is worth a look, in the order of time: what failed, what came near to it, warnings."""
         found = []
         for check in self.verdict["checks"]:
-            at = moment_of(check)
-            if at is None or (
-                check["passed"] and (at > self.end_s - _END_S or not _is_measured(check["value"]))
-            ):
+            at, value = moment_of(check), check["value"]
+            shows = isinstance(value, float) and value != 0.0  # neither yes or no, nor nothing at all
+            if at is None or (check["passed"] and (at > self.end_s - _END_S or not shows)):
                 continue
             title = check["name"] if check["passed"] else f"{check['name']} fails"
             text = check["reason"] or "nearest to its limit"
@@ -260,8 +259,3 @@ def _seconds(times_ns: NDArray[np.int64]) -> Array:
 def _joined(strips: list[Array]) -> Array:
     """Return one line of segments that follow each other."""
     return np.concatenate([strips[0], *(s[1:] for s in strips[1:])]) if strips else np.zeros((0, 2))
-
-
-def _is_measured(value: object) -> bool:
-    """Whether there is something to see of a check that holds: neither yes or no, nor nothing at all."""
-    return isinstance(value, float) and value != 0.0
