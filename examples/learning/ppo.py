@@ -212,10 +212,7 @@ class PPO:
                 last = np.stack([info["final_obs"][i] for i in cut])
                 rewards[step, cut] += config.gamma * self.critic(policy.normaliser(last))[:, 0]
             for i in np.flatnonzero(over[step]):
-                final = info.get("final_info", {})
-                numbers = {
-                    k: float(v[i]) for k, v in final.items() if not k.startswith("_") and np.ndim(v) == 1
-                }
+                numbers = final_numbers(info, i)
                 ended.append({**numbers, "return": float(returns[i]), "length": float(lengths[i])})
             returns[over[step]] = lengths[over[step]] = 0
         after = self.critic(policy.normaliser(observations))[:, 0]

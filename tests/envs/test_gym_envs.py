@@ -228,6 +228,9 @@ def test_an_unknown_render_mode_is_told_in_one_sentence(env, vector):
 def test_seeds_are_one_for_each(vector):
     with pytest.raises(GymError, match="2 seeds for 4 environments"):
         vector.reset(seed=[1, 2])
+    for seed, said in ([1, 2, -1, 0], "-1"), ([0, 1.5, 2, 3], r"1\.5"), (0.5, r"0\.5"), ("abcd", "'a(bcd)?'"):
+        with pytest.raises(GymError, match=f"seed {said}; valid: a whole number from 0 on"):
+            vector.reset(seed=seed)
 
 
 def test_memory_does_not_grow_with_episodes(vector):

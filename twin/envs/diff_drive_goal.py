@@ -48,7 +48,7 @@ class DiffDriveGoalConfig(NavigationConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         inner = self.inner
-        if inner.min() <= 0.0 or 2.0 * math.hypot(*inner) <= self.least_distance:
+        if not (inner.min() > 0.0 and self.least_distance < 2.0 * math.hypot(*inner) < math.inf):
             x, y = self.room
             raise GymError(
                 f"a room of {x:g} m x {y:g} m has no start and goal {self.least_distance:g} m apart which "

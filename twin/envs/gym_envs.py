@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -140,13 +140,15 @@ class NavigationVectorEnv(VectorEnv[Observation, Observation, NDArray[Any]]):
         return np.flatnonzero(mask)
 
     def _take_seeds(self, seed: int | Sequence[int | None] | None, which: NDArray[np.intp]) -> None:
-        given: Sequence[int | None]
         if seed is None:
-            given = [None] * self.num_envs
+            given: list[Any] = [None] * self.num_envs
         elif isinstance(seed, int | np.integer):
             given = [int(seed) + i for i in range(self.num_envs)]
         else:
-            given = list(seed)
+            given = list(seed) if isinstance(seed, Iterable) else [seed]
+        wrong = [s for s in given if s is not None and not (isinstance(s, int | np.integer) and s >= 0)]
+        if wrong:
+            raise GymError(f"seed {wrong[0]!r}; valid: a whole number from 0 on")
         if len(given) != self.num_envs:
             raise GymError(f"{len(given)} seeds for {self.num_envs} environments; valid: one for each")
         if not self._seeds:

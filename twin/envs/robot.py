@@ -112,15 +112,6 @@ class DrivenRobot:
             is_left=np.arange(len(joints)) < left,
         )
 
-    def root_qpos(self, model: mujoco.MjModel) -> int:
-        """Return where the root link's position and quaternion (7 numbers) begin in `qpos`."""
-        body = model.body(f"{ROBOT}/{self.description.root}")
-        return int(model.jnt_qposadr[body.jntadr[0]])
-
-    def lidar_body(self, model: mujoco.MjModel) -> int:
-        """Return the body of the lidar's link, which the lidar does not see."""
-        return int(model.body(f"{ROBOT}/{self.lidar.link}").id)
-
     def beams(self, count: int) -> Array:
         """Return the directions of `count` of the lidar's rays in the root frame, shape (count, 3).
 

@@ -69,7 +69,7 @@ class Simulations:
         self.qpos, self.qvel, self.ctrl = bind("qpos"), bind("qvel"), bind("ctrl")
         self.mocap_pos, self.mocap_quat = bind("mocap_pos"), bind("mocap_quat")
         self._touches = bind("sensordata")
-        root = robot.root_qpos(self.model)
+        root = self.model.jnt_qposadr[self.model.body(f"{ROBOT}/{robot.description.root}").jntadr[0]]
         self.root = self.qpos[:, root : root + 7]
         """Poses of the root link, x y z [m] and quat_wxyz, shape (n, 7)."""
         self._substeps = round(control_period / self.model.opt.timestep)
@@ -78,7 +78,8 @@ class Simulations:
         self.lidar_noise = np.zeros(count)
         """Standard deviation of each lidar's ranges, shape (n,) [m]."""
         self._mount, self._beams = robot.T_root_lidar.xyz, robot.beams(beams)
-        self._lidar_body = robot.lidar_body(self.model)
+        self._lidar_body = int(self.model.body(f"{ROBOT}/{robot.lidar.link}").id)
+        """The lidar does not see it."""
 
     def begin(self, i: int, episode: Episode, start: Pose2) -> None:
         """Let simulation `i` begin an episode: a robot of its own draw, at rest at `start`."""

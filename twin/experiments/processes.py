@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import faulthandler
+import math
 import multiprocessing
 import os
 import signal
@@ -38,7 +39,7 @@ class _Process(Generic[Job]):
     process: BaseProcess
     pipe: Connection
     job: Job | None = None
-    deadline: float = float("inf")
+    deadline: float = math.inf
     """Of its job, by the monotonic clock [s]."""
 
 
@@ -92,7 +93,7 @@ class Processes(Generic[Job]):
         with suppress(OSError):  # it has died meanwhile, which `wait` tells
             idle.pipe.send(job)
 
-    def wait(self, timeout_s: float) -> list[tuple[Job, Any]]:
+    def wait(self, timeout_s: float = math.inf) -> list[tuple[Job, Any]]:
         """Return jobs that have ended, each with its result or what was `Lost`; wait for the first of them.
 
         Args:
@@ -103,7 +104,7 @@ class Processes(Generic[Job]):
         """
         by_pipe = {each.pipe: each for each in self._processes if each.job is not None}
         end = min([time.monotonic() + timeout_s, *(each.deadline for each in by_pipe.values())])
-        ready = wait(list(by_pipe), max(0.0, end - time.monotonic()))
+        ready = wait(list(by_pipe), None if end == math.inf else max(0.0, end - time.monotonic()))
         ended = [self._result_of(by_pipe[pipe]) for pipe in ready if isinstance(pipe, Connection)]
         now = time.monotonic()
         for each in [each for each in by_pipe.values() if each.pipe not in ready and each.deadline <= now]:
@@ -132,7 +133,7 @@ class Processes(Generic[Job]):
             each.process.join()
             code = each.process.exitcode or 0
             return self._end(each), Lost(reason=_death(code))
-        job, each.job, each.deadline = each.job, None, float("inf")
+        job, each.job, each.deadline = each.job, None, math.inf
         assert job is not None
         if isinstance(result, BaseException):
             raise result

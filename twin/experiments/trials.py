@@ -21,7 +21,6 @@ from twin.scenario.source import Source
 from twin.scenario.verdict import Verdict
 
 _KIND = "trials"
-_POLL_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ class Trials:
         while pending:
             while self._processes.free and (job := next(jobs, None)) is not None:
                 self._processes.start(job)
-            for (key, trial), result in self._processes.wait(_POLL_S):
+            for (key, trial), result in self._processes.wait():
                 pending -= 1
                 self.made += 1
                 self.told(self.made)

@@ -15,30 +15,29 @@ _AT_LIMIT = 0.98
 """Of what friction can give: a wheel that uses more of it slides."""
 
 
-class Sliding:
-    """In how many ticks shapes needed more than friction gives, or than it would give without a fault."""
+class Sliding(Fault):
+    """Tells in how many ticks shapes needed more than friction gives, or than it would give without it."""
 
-    def __init__(self) -> None:
-        self.touched = self.slid = 0
-        self._most = 0.0
+    touched = slid = 0
+    _most = 0.0
 
-    def add(self, fault: Fault, geoms: list[int], factor: float) -> None:
+    def look(self, geoms: list[int], factor: float) -> None:
         """Look at the last physics step; `factor` of their friction the shapes have now."""
-        grip = fault.context.world.alterations.grip(geoms)
+        grip = self.context.world.alterations.grip(geoms)
         self.touched += grip.touches
         self._most = max(self._most, grip.share)
         self.slid += grip.share * max(1.0, factor) >= (_AT_LIMIT if factor <= 1.0 else 1.0)
 
     @property
     def effect(self) -> Effect:
-        """What came of it."""
+        """Whether wheels slid."""
         text = f"wheels at the limit of friction in {self.slid} of {self.touched} ticks"
         if self.touched and not self.slid:
             text += f"; they used at most {100.0 * self._most:.0f} % of it"
         return Effect(self.slid > 0, text)
 
 
-class Friction(FaultOfRobot):
+class Friction(FaultOfRobot, Sliding):
     """Driven wheels have less grip than they should, or more."""
 
     value = "factor"
@@ -58,7 +57,6 @@ class Friction(FaultOfRobot):
         shapes = context.world.alterations.wheels(handle.name, handle.description)
         self._geoms = [geom for joint in joints for geom in shapes[joint]]
         self.text = f"{', '.join(joints)} of {self.robot.name}: {config.factor:g} times the friction"
-        self._sliding = Sliding()
 
     def begin(self) -> None:
         """Take grip away."""
@@ -70,12 +68,7 @@ class Friction(FaultOfRobot):
 
     def update(self) -> None:
         """See whether the wheels slide."""
-        self._sliding.add(self, self._geoms, self.config.factor)
-
-    @property
-    def effect(self) -> Effect:
-        """Whether the wheels slid."""
-        return self._sliding.effect
+        self.look(self._geoms, self.config.factor)
 
 
 class WheelSlip(Friction):
@@ -93,7 +86,7 @@ class WheelSlip(Friction):
         """Of the wheel's own coefficient of friction."""
 
 
-class SlipperyFloor(Fault):
+class SlipperyFloor(Sliding):
     """The floor, or a patch of it, is wet, oily or icy."""
 
     value = "friction"
@@ -109,17 +102,19 @@ class SlipperyFloor(Fault):
 
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
-        alterations, self._sliding = context.world.alterations, Sliding()
-        wheels = [
-            alterations.wheels(robot.name, robot.handle.description) for robot in context.robots.values()
-        ]
+        shapes_of, robots = context.world.alterations.wheels, context.robots.values()
+        wheels = [shapes_of(robot.name, robot.handle.description) for robot in robots]
         self._geoms = [geom for robot in wheels for shapes in robot.values() for geom in shapes]
         where = "everywhere" if config.patch is None else "in one place"
         self.text = f"the floor is slippery {where}: {config.friction:g}"
 
     def begin(self) -> None:
         """Wet the floor."""
-        self._lay()
+        alterations, on_it = self.context.world.alterations, set(self._on_it())
+        for geom in self._geoms:
+            own = alterations.friction(geom)
+            slips = geom in on_it and own > self.config.friction
+            alterations.scale_friction((geom,), self.config.friction / own if slips else None, self)
 
     def end(self) -> None:
         """Dry it."""
@@ -127,15 +122,9 @@ class SlipperyFloor(Fault):
 
     def update(self) -> None:
         """See which wheels are on the patch, and whether they slide."""
-        on_it = self._on_it()
-        if on_it:
-            self._sliding.add(self, on_it, 0.0)
-        self._lay()
-
-    @property
-    def effect(self) -> Effect:
-        """Whether wheels slid."""
-        return self._sliding.effect
+        if on_it := self._on_it():
+            self.look(on_it, 0.0)
+        self.begin()
 
     def _on_it(self) -> list[int]:
         patch, alterations = self.config.patch, self.context.world.alterations
@@ -143,13 +132,6 @@ class SlipperyFloor(Fault):
             return self._geoms
         at = ((geom, alterations.position(geom)) for geom in self._geoms)
         return [g for g, (x, y, _) in at if math.hypot(x - patch.x, y - patch.y) <= patch.within]
-
-    def _lay(self) -> None:
-        alterations, on_it = self.context.world.alterations, set(self._on_it())
-        for geom in self._geoms:
-            own = alterations.friction(geom)
-            slips = geom in on_it and own > self.config.friction
-            alterations.scale_friction((geom,), self.config.friction / own if slips else None, self)
 
 
 class StuckCaster(FaultOfRobot):

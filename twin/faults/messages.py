@@ -111,6 +111,10 @@ class MessageFault(Fault):
         """All: their topics are looked at in one place."""
         return frozenset(self.context.robots)
 
+    def happens(self, message: Carried) -> bool:
+        """Return whether a message is one of the `share` to which it happens, each on its own."""
+        return bool(self.stream(message).uniform(message.sequence, 1)[0] < self.config.share)
+
     def stream(self, message: Carried) -> NoiseStream:
         """Return the random numbers for the messages of a publisher, by its count."""
         key = message.topic, message.sender
@@ -140,7 +144,7 @@ class Loss(MessageFault):
 
     def copies(self, message: Carried) -> Sequence[int]:
         """Lose it, or not."""
-        return () if self.stream(message).uniform(message.sequence, 1)[0] < self.config.share else _AS_IT_IS
+        return () if self.happens(message) else _AS_IT_IS
 
 
 class LinkDelay(MessageFault):
@@ -183,5 +187,4 @@ class Duplication(MessageFault):
 
     def copies(self, message: Carried) -> Sequence[int]:
         """Double it, or not."""
-        again = self.stream(message).uniform(message.sequence, 1)[0] < self.config.share
-        return (0, round(self.config.time * 1e9)) if again else _AS_IT_IS
+        return (0, round(self.config.time * 1e9)) if self.happens(message) else _AS_IT_IS

@@ -71,15 +71,8 @@ class WeakMotor(WeakDrives):
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
         robot, hardware = self.robot.name, self.hardware
-        wheels = wheels_of(self)
-        self.joints = wheels if config.joint is None else [config.joint]
-        some(
-            "motor at joint",
-            config.joint,
-            hardware.commanded_joints if config.joint else wheels,
-            "joint",
-            robot,
-        )
+        valid = hardware.commanded_joints if config.joint else wheels_of(self)
+        self.joints = some("motor at joint", config.joint, valid, "joint", robot)
         endless = [joint for joint in self.joints if not math.isfinite(hardware.strongest(joint))]
         if endless and config.factor > 0.0:
             raise refuse(

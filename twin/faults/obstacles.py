@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -18,7 +19,7 @@ _IN_THE_WAY = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class ObstacleConfig(LastingRobotFault):
+class ObstacleConfig(LastingRobotFault, ABC):
     """Something in the way."""
 
     pose: PoseConfig | None = None
@@ -26,9 +27,9 @@ class ObstacleConfig(LastingRobotFault):
     ahead: Annotated[Metres, Positive] | None = None
     """... or so far ahead of the robot's base, turned as the robot is [m]."""
 
+    @abstractmethod
     def obstacle(self, name: str) -> Obstacle:
         """Return it as the world has obstacles."""
-        raise NotImplementedError
 
 
 class InTheWay(Fault):

@@ -35,13 +35,9 @@ class Dropout(ReadingFault):
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
         self._stream = self.noise(config.sensor)
+        self.did = "dropped" if config.of == "readings" else "with missing values"
         if config.of == "values" and not isinstance(values_of(self.example).get(self.measures), np.ndarray):
             raise refuse("of", f"sensor '{config.sensor}' measures no array of values; valid is readings")
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return "dropped" if self.config.of == "readings" else "with missing values"
 
     def alter(self, reading: Any, time_ns: int) -> Any:
         """Return the reading, or what is left of it."""
@@ -63,11 +59,7 @@ class Freeze(ReadingFault):
         """A sensor that says the same again and again."""
 
     _last: Any = None
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return "frozen"
+    did = "frozen"
 
     def saw(self, reading: Any) -> None:
         """Keep a reading."""
@@ -91,6 +83,8 @@ class Delay(ReadingFault):
         time: Annotated[Seconds, Positive]
         """By how much [s]; nodes hear of it at the first control period after that."""
 
+    did = "late"
+
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
         self._delay_ns = round(config.time * 1e9)
@@ -98,16 +92,8 @@ class Delay(ReadingFault):
         self._link: Counted | None = None
         if self.publisher is not None:
             node = self.publisher.node
-            topic = node.resolve_name(config.sensor)
-            full_name = node.fully_qualified_name
-            self._link = Counted(
-                lambda heard: (self._delay_ns,), lambda h: (h.topic, h.sender) == (topic, full_name)
-            )
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return "late"
+            own = node.resolve_name(config.sensor), node.fully_qualified_name
+            self._link = Counted(lambda heard: (self._delay_ns,), lambda h: (h.topic, h.sender) == own)
 
     @property
     def effect(self) -> Effect:
@@ -158,11 +144,7 @@ class LidarFailure(Freeze):
         super().__init__(name, config, context)
         what = f"lidar '{config.sensor}' of {self.robot.name}"
         self.text, self.end_text = f"{what}: {config.kind}", f"{what} works again"
-
-    @property
-    def did(self) -> str:
-        """What it did."""
-        return {"stop": "dropped", "freeze": "frozen"}.get(self.config.kind, f"all {self.config.kind}")
+        self.did = {"stop": "dropped", "freeze": "frozen"}.get(config.kind, f"all {config.kind}")
 
     def alter(self, reading: Any, time_ns: int) -> Any:
         """Return what a lidar that fails says."""

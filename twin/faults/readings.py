@@ -47,6 +47,8 @@ class ReadingFault(FaultOfRobot):
 
     device: ClassVar[type] = object
     """Of which class the sensor must be."""
+    did = "altered"
+    """What it does to readings, in a word."""
 
     def __init__(self, name: str, config: Any, context: FaultContext) -> None:
         super().__init__(name, config, context)
@@ -84,11 +86,6 @@ class ReadingFault(FaultOfRobot):
     @abstractmethod
     def alter(self, reading: Any, time_ns: int) -> Any:
         """Return what becomes of a reading; None: nothing is said."""
-
-    @property
-    def did(self) -> str:
-        """What it did to readings, in one word."""
-        return "altered"
 
     @property
     def effect(self) -> Effect:

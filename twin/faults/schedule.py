@@ -22,7 +22,7 @@ class _Watched:
         config = fault.config
         lasts = getattr(config, "duration", None)
         self._after_ns = round(config.after * 1e9)
-        self._lasts = lasts
+        self._lasts_ns = None if lasts is None else round(lasts * 1e9)
         self.due_ns: int | None = round((config.at or 0.0) * 1e9) if wait is None else None
         """When it is to begin; None while it waits."""
         self.begun_ns: int | None = None
@@ -40,15 +40,9 @@ class _Watched:
         return self.due_ns is not None and self.due_ns <= now_ns
 
     def is_over(self, now_ns: int) -> bool:
-        if self._lasts is None or self.due_ns is None:
-            return False
-        began = self.fault.config.at or 0.0
-        end_ns = (
-            round((began + self._lasts) * 1e9)
-            if self.wait is None
-            else self.due_ns + round(self._lasts * 1e9)
+        return (
+            self._lasts_ns is not None and self.due_ns is not None and self.due_ns + self._lasts_ns <= now_ns
         )
-        return end_ns <= now_ns
 
     def report(self) -> FaultReport:
         if self.begun_ns is None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -14,7 +16,40 @@ _LEAST_RAD, _LEAST_M = 1e-3, 1e-4
 """Less is no effect."""
 
 
-class Encoder(FaultOfRobot):
+class TurningWheels(FaultOfRobot):
+    """Something is wrong by a factor for as long as wheels turn."""
+
+    joints: Sequence[str] = ()
+    _last: Sequence[float] = ()
+    angle = 0.0
+    """How far the joints have turned since the begin, there and back, all together [rad]."""
+
+    @abstractmethod
+    def alter(self, joint: str, factor: float | None) -> None:
+        """Let a joint be wrong by a factor; None: as it was."""
+
+    def begin(self) -> None:
+        """Let all be wrong."""
+        self._last = self._angles()
+        for joint in self.joints:
+            self.alter(joint, self.config.factor)
+
+    def end(self) -> None:
+        """Let all be right, from here."""
+        for joint in self.joints:
+            self.alter(joint, None)
+
+    def update(self) -> None:
+        """Add up how far the joints turn."""
+        now = self._angles()
+        self.angle += math.fsum(abs(a - b) for a, b in zip(now, self._last, strict=True))
+        self._last = now
+
+    def _angles(self) -> list[float]:
+        return [self.hardware.angle(joint) for joint in self.joints]
+
+
+class Encoder(TurningWheels):
     """The encoder of a wheel counts wrongly."""
 
     @dataclass(frozen=True, kw_only=True)
@@ -31,25 +66,16 @@ class Encoder(FaultOfRobot):
         joint, robot = config.joint, self.robot.name
         one_of("encoder at joint", joint, self.hardware.encoders, "joint", robot)
         self.text = f"the encoder of {robot}'s {joint} counts {config.factor:g} times what it should"
-        self._turned = Turned(self, [joint])
+        self.joints = [joint]
 
-    def begin(self) -> None:
+    def alter(self, joint: str, factor: float | None) -> None:
         """Count wrongly."""
-        self._turned.start()
-        self.hardware.misread(self.config.joint, self.config.factor, self)
-
-    def end(self) -> None:
-        """Count as before, from here."""
-        self.hardware.misread(self.config.joint, None, self)
-
-    def update(self) -> None:
-        """Add up how far the wheel turns."""
-        self._turned.add()
+        self.hardware.misread(joint, factor, self)
 
     @property
     def effect(self) -> Effect:
         """How much was counted wrongly."""
-        wrong = self._turned.angle * abs(1.0 - self.config.factor)
+        wrong = self.angle * abs(1.0 - self.config.factor)
         return Effect(wrong > _LEAST_RAD, f"{self.config.joint}: {wrong:.3f} rad counted wrongly")
 
 
@@ -89,7 +115,7 @@ class OdometryJump(FaultOfRobot):
         return Effect(most > _LEAST_RAD, f"wheels counted up to {most:.3f} rad that they did not turn")
 
 
-class WheelRadius(FaultOfRobot):
+class WheelRadius(TurningWheels):
     """Wheels are smaller, or larger, than odometry and controllers reckon with."""
 
     value = "factor"
@@ -105,31 +131,19 @@ class WheelRadius(FaultOfRobot):
 
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
-        self._joints = some("driven wheel", config.joint, wheels_of(self), "joint", self.robot.name)
+        self.joints = some("driven wheel", config.joint, wheels_of(self), "joint", self.robot.name)
         drive = self.robot.drive
         self._radius = drive.config.drive.wheel_radius if drive is not None else math.nan
         self.text = f"wheels of {self.robot.name} are {config.factor:g} times as large as believed"
-        self._turned = Turned(self, self._joints)
 
-    def begin(self) -> None:
-        """Change the wheels."""
-        self._turned.start()
-        for joint in self._joints:
-            self.hardware.resize_wheel(joint, self.config.factor, self)
-
-    def end(self) -> None:
-        """Put the right ones back."""
-        for joint in self._joints:
-            self.hardware.resize_wheel(joint, None, self)
-
-    def update(self) -> None:
-        """Add up how far the wheels turn."""
-        self._turned.add()
+    def alter(self, joint: str, factor: float | None) -> None:
+        """Change a wheel."""
+        self.hardware.resize_wheel(joint, factor, self)
 
     @property
     def effect(self) -> Effect:
         """How much of the way odometry misjudges."""
-        wrong = self._turned.angle / len(self._joints) * self._radius * abs(1.0 - 1.0 / self.config.factor)
+        wrong = self.angle / len(self.joints) * self._radius * abs(1.0 - 1.0 / self.config.factor)
         return Effect(wrong > _LEAST_M, f"{wrong:.4f} m of each wheel's way misjudged")
 
 
@@ -178,29 +192,6 @@ class Track(FaultOfRobot):
     def _mount(self, factor: float | None) -> None:
         handle = self.robot.handle
         self.context.world.alterations.scale_track(handle.name, handle.description, factor, self)
-
-
-class Turned:
-    """How far some joints have turned."""
-
-    def __init__(self, fault: FaultOfRobot, joints: list[str]) -> None:
-        self._hardware, self._joints = fault.hardware, joints
-        self._last: list[float] = []
-        self.angle = 0.0
-        """There and back, of all joints together [rad]."""
-
-    def start(self) -> None:
-        """Begin here."""
-        self._last = self._now()
-
-    def add(self) -> None:
-        """Add what they have turned since the last call."""
-        now = self._now()
-        self.angle += math.fsum(abs(a - b) for a, b in zip(now, self._last, strict=True))
-        self._last = now
-
-    def _now(self) -> list[float]:
-        return [self._hardware.angle(joint) for joint in self._joints]
 
 
 def wheels_of(fault: FaultOfRobot) -> list[str]:

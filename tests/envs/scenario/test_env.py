@@ -174,6 +174,8 @@ def test_what_an_environment_is_made_of_can_be_pickled(make: MakeEnv, small: Pat
         ({"observe": ["/odom.pose"]}, "/odom.pose has no bounds; valid is Field"),
         ({"observe": ["/tf"]}, "/tf carries tf2_msgs/msg/TFMessage, of which fields can be shown"),
         ({"observe": ["scan", "/scan"]}, "two parts of the observation are called 'scan'"),
+        ({"agent": int}, "there is no agent '<class 'int'>'; "),
+        ({"agent": ["drive"]}, r"there is no agent '\['drive'\]'"),
         ({"reward": {"prgress": 1}}, "there is no reward 'prgress'; did you mean 'progress'?"),
         ({"ticks": 0}, "ticks=0: valid is a whole number of control periods, 1 or more"),
         ({"ticks": 1.5}, "ticks=1.5: valid"),
@@ -209,7 +211,7 @@ def test_of_several_robots_one_has_to_be_named(folder: Path) -> None:
 
 
 def test_without_a_scenario_it_is_one_sentence() -> None:
-    with pytest.raises(GymError, match=r"needs scenario=\.\.\., the name or file of a scenario"):
+    with pytest.raises(GymError, match=r"scenario is None; valid: scenario=\.\.\. with the name or file"):
         gym.make("twin.envs:twin/Scenario-v0")
 
 

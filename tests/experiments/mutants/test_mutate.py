@@ -136,6 +136,20 @@ def test_mutants_of_ones_own(straight: Path) -> None:
         mutate(load(straight).source, Here(), ["mirrored_weel"])
 
 
+@pytest.mark.parametrize("place", ["{file}:Slow", "a_bad_one:Slow"])
+def test_a_mutant_that_was_edited_is_another_one(
+    straight: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    file = straight.with_name("a_bad_one.py")
+    file.write_text(OWN, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(straight.parent))
+    trial = MutantTrial(load(straight).source, mutant=place.format(file=file))
+    before = trial.key
+    assert trial.key == before
+    file.write_text(OWN.replace("0.1 m/s", "0.15 m/s"), encoding="utf-8")
+    assert trial.key != before, "what is remembered of the old one does not count"
+
+
 def test_a_mutant_that_is_wrong_itself_catches_nothing(straight: Path) -> None:
     file = straight.with_name("bad.py")
     file.write_text(OWN, encoding="utf-8")

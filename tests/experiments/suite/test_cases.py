@@ -34,6 +34,14 @@ def test_a_file_without_the_key_is_one_test(tmp_path: Path) -> None:
     assert case.command == f"twin run {file}"
 
 
+def test_each_test_has_a_folder_of_its_own_however_long_its_name(tmp_path: Path) -> None:
+    file = write(tmp_path, "test:\n  grid:\n    mission.steps.0.linear: [0.1 m/s, 0.2 m/s]\n")
+    file.write_text(file.read_text("utf-8").replace("name: demo", f"name: {'d' * 200}"), encoding="utf-8")
+    folders = [case.folder for case in cases_of(file)]
+    assert len(set(folders)) == 2
+    assert max(map(len, folders)) <= 150
+
+
 def test_each_seed_and_each_combination_is_a_test_whose_command_makes_that_run(tmp_path: Path) -> None:
     file = write(
         tmp_path,

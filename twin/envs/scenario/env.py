@@ -63,8 +63,8 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         Raises:
             TwinError: The scenario cannot be run, or is no environment for this agent.
         """
-        if scenario is None:
-            raise GymError("an environment needs scenario=..., the name or file of a scenario")
+        if not isinstance(scenario, Scenario | str | Path):
+            raise GymError(f"scenario is {scenario!r}; valid: scenario=... with the name or file of one")
         self._kind = agent_of(agent)
         self._config = config_of(self._kind, settings)
         self._file, self._overrides = scenario, dict(overrides)
@@ -269,11 +269,11 @@ def agent_of(agent: str | type[Agent]) -> type[Agent]:
     Raises:
         GymError: There is none of that name.
     """
-    if isinstance(agent, type):
+    if isinstance(agent, type) and issubclass(agent, Agent):
         return agent
-    if agent not in AGENTS:
-        raise GymError(f"there is no agent '{agent}'; {nearest(agent, AGENTS)}")
-    return AGENTS[agent]
+    if (name := str(agent)) not in AGENTS:
+        raise GymError(f"there is no agent '{name}'; {nearest(name, AGENTS)}")
+    return AGENTS[name]
 
 
 def config_of(kind: type[Agent], settings: Mapping[str, Any]) -> Any:

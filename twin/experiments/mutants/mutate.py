@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal
 
 from twin.errors import PluginError, ScenarioError
@@ -87,18 +88,16 @@ def mutate(source: Source, trials: Trials, mutants: Sequence[str] = ()) -> Repor
 
 
 def _outcome(mutant: str, says: str, verdict: Mapping[str, Any], digest: str) -> Outcome:
+    outcome = partial(Outcome, mutant=mutant, says=says)
     if NOT_HERE in verdict:
-        return Outcome(mutant=mutant, says=says, fate="not here", why=verdict[NOT_HERE])
+        return outcome(fate="not here", why=verdict[NOT_HERE])
     if verdict["error"] is not None:
-        return Outcome(mutant=mutant, says=says, fate="caught", why=verdict["error"])
+        return outcome(fate="caught", why=verdict["error"])
     failed = [check for check in verdict["checks"] if not check["passed"]]
     # Of a run that was ended early the others only lack what would have come.
     failed = [check for check in failed if check["name"] in verdict[DECIDED]] or failed
     if failed:
         by = tuple(check["name"] for check in failed)
         first = failed[0]
-        return Outcome(
-            mutant=mutant, says=says, fate="caught", by=by, why=first["reason"], at_s=first["at_s"]
-        )
-    fate: Fate = "no effect" if verdict["digest"] == digest else "survived"
-    return Outcome(mutant=mutant, says=says, fate=fate)
+        return outcome(fate="caught", by=by, why=first["reason"], at_s=first["at_s"])
+    return outcome(fate="no effect" if verdict["digest"] == digest else "survived")

@@ -18,7 +18,7 @@ _CATALOGUE = {
     "manipulation": """weak_grasp early_gripper early_release shallow_place low_carry approach_offset
         arm_offset lift_offset""",
 }
-"""Functions of each module of the catalogue, which is imported when one of them is used."""
+"""Those of each module of the catalogue, which is imported when one of them is used."""
 
 for _module, _names in _CATALOGUE.items():
     for _name in _names.split():

@@ -39,7 +39,8 @@ class MutantTrial(Trial):
     @property
     def key(self) -> str:
         """What the outcome depends on; of a user's mutant the file that it is in, too."""
-        return json.dumps([super().key, self.mutant, hash_of(self.mutant.rpartition(":")[0])])
+        file = MUTANTS.find(self.mutant).place.file
+        return json.dumps([super().key, self.mutant, file and hash_of(file)])
 
     def perform(self) -> dict[str, Any]:
         """Run until a check fails, and return the content of the verdict, or `NOT_HERE`, or `FAULT`."""

@@ -22,6 +22,7 @@ _WALL_FROM, _WALL_TO = 0.05, 0.6
 """Solids between these heights are in the way of a robot, and drawn from above [m]."""
 
 
+_CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 _TRAILS: tuple[tuple[str, str, str, Any], ...] = (
     ("odometry", "odometry", "odometry alone", (0, (1, 1.2))),
     ("estimate", "belief", "belief", "-"),
@@ -59,14 +60,12 @@ def trajectory(told: Told, moments: list[Moment], size: tuple[float, float] = (W
             for point, mark, text in ((truth[:1], "o", "start"), (truth[-1:], "s", "end")):
                 if len(point):
                     axes.plot(*point.T, mark, **ink, zorder=6, label=None if several else text)
-        for number, moment in enumerate(moments, 1):
-            for robot in told.robots[:1]:
-                times, truth = told.truth(robot)
-                if len(times):
-                    at = truth[min(len(truth) - 1, int(np.searchsorted(times, moment.time_s)))]
-                    _mark(axes, at, number, moment)
-        axes.set_xlabel("x [m]")
-        axes.set_ylabel("y [m]")
+        for robot in told.robots[:1]:
+            times, truth = told.truth(robot)
+            for number, moment in enumerate(moments if len(times) else [], 1):
+                at = truth[min(len(truth) - 1, int(np.searchsorted(times, moment.time_s)))]
+                _mark(axes, at, number, moment)
+        axes.set(xlabel="x [m]", ylabel="y [m]")
         axes.grid(visible=True, color=ROLES["line"], lw=0.5, zorder=0)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=6, frameon=False, fontsize=8.5)
         return svg(drawn, f"The floor from above, with the paths of {', '.join(told.robots) or 'nobody'}")
@@ -90,10 +89,9 @@ def time_series(told: Told, moments: list[Moment]) -> str:
             axes.set_title(title, loc="left", fontsize=9, color=ROLES["ink"], pad=18 if is_full else None)
             axes.grid(visible=True, color=ROLES["line"], lw=0.5)
             if len(lines) > 1:
-                corner = ("lower left", (0.0, 0.98)) if is_full else ("lower right", (1.0, 0.98))
                 axes.legend(
-                    loc=corner[0],
-                    bbox_to_anchor=corner[1],
+                    loc="lower left" if is_full else "lower right",
+                    bbox_to_anchor=(0.0 if is_full else 1.0, 0.98),
                     ncols=8,
                     frameon=False,
                     fontsize=8,
@@ -150,35 +148,17 @@ def _timeline(axes: Axes, told: Told) -> None:
     width = max(told.end_s, 1e-3)
     for start, end, name in told.states:
         role = colours.setdefault(name, f"state{len(colours) % 8}")
-        axes.barh(
-            0.0,
-            end - start,
-            left=start,
-            height=1.0,
-            color=ROLES[role],
-            alpha=0.45,
-            edgecolor=ROLES["paper"],
-            lw=0.8,
-        )
+        look: dict[str, Any] = {"color": ROLES[role], "edgecolor": ROLES["paper"], "alpha": 0.45, "lw": 0.8}
+        axes.barh(0.0, end - start, height=1.0, left=start, **look)
         fits = int(105 * (end - start) / width)
         if fits >= 4:
             text = name if len(name) <= fits else f"{name[: fits - 1]}…"
-            axes.text(
-                (start + end) / 2.0,
-                0.0,
-                text,
-                ha="center",
-                va="center",
-                fontsize=8,
-                color=ROLES["ink"],
-                clip_on=True,
-            )
-    axes.set_ylim(-0.5, 0.5)
-    axes.set_yticks([])
+            middle = (start + end) / 2.0
+            axes.text(middle, 0.0, text, fontsize=8, color=ROLES["ink"], clip_on=True, **_CENTRED)
+    axes.set(ylim=(-0.5, 0.5), yticks=[])
     axes.tick_params(bottom=False)
     axes.set_title("mission", loc="left", fontsize=9, color=ROLES["ink"], pad=14)
-    for side in ("top", "right", "left", "bottom"):
-        axes.spines[side].set_visible(False)
+    axes.spines[:].set_visible(False)
 
 
 def _floor(axes: Axes, told: Told) -> None:
@@ -196,31 +176,18 @@ def _floor(axes: Axes, told: Told) -> None:
         shape = solid.geometry
         if isinstance(shape, Box):
             half = np.array(shape.size) / 2.0
-            corners = (
-                np.array([(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]) * half
-            )
+            corners = half * [(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         elif isinstance(shape, Cylinder | Sphere):
-            turn, height = (
-                np.linspace(0.0, 2.0 * np.pi, 24),
-                getattr(shape, "length", 2.0 * shape.radius) / 2.0,
-            )
+            turn = np.linspace(0.0, 2.0 * np.pi, 24)
+            height = getattr(shape, "length", 2.0 * shape.radius) / 2.0
             ring = shape.radius * np.stack((np.cos(turn), np.sin(turn)), axis=1)
             corners = np.vstack([np.column_stack((ring, np.full(24, z))) for z in (-height, height)])
         else:
             continue
         points = corners @ matrix_from_quat_wxyz(solid.pose.quat_wxyz).T + solid.pose.xyz
         if points[:, 2].min() < _WALL_TO and points[:, 2].max() > _WALL_FROM:
-            axes.add_patch(
-                Polygon(
-                    _hull(points[:, :2]),
-                    closed=True,
-                    fc=ROLES["solid"],
-                    ec=ROLES["wall"],
-                    lw=0.5,
-                    alpha=0.5,
-                    zorder=1,
-                )
-            )
+            look: dict[str, Any] = {"fc": ROLES["solid"], "ec": ROLES["wall"], "lw": 0.5, "alpha": 0.5}
+            axes.add_patch(Polygon(_hull(points[:, :2]), closed=True, zorder=1, **look))
 
 
 def _hull(points: Array) -> Array:
@@ -236,11 +203,10 @@ def _mark(axes: Axes, at: Array, number: int, moment: Moment) -> None:
         (at[0], at[1]),
         (11, 11),
         textcoords="offset points",
-        ha="center",
-        va="center",
         fontsize=8.5,
         zorder=8,
         color=colour,
+        **_CENTRED,
         bbox={"boxstyle": "circle,pad=0.25", "fc": ROLES["paper"], "ec": colour, "lw": 1.1},
         arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
     )

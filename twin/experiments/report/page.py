@@ -101,7 +101,8 @@ def run_section(told: Told, *, whole: bool) -> str:
         parts += [f"<{below}>Verdict</{below}>", _checks(verdict["checks"])]
     if verdict.get("faults"):
         parts += [f"<{below}>Faults</{below}>", _faults(verdict["faults"])]
-    parts.append(_again(verdict))
+    if command := verdict.get("command"):
+        parts.append(f"<p>Run it again:</p><pre>{escape(command)}</pre>")
     if told.recording is None:
         parts.append(
             f'<p class="quiet">{escape(told.missing)} Path, speeds and pictures need a recording.</p>'
@@ -138,7 +139,7 @@ def _pictures(told: Told, level: str) -> list[str]:
 
 def _photos(told: Told, level: str) -> list[str]:
     """Return pictures of the start, of the moments and of the end, or why there are none."""
-    from twin.experiments.report.photos import photo, why_none
+    from twin.experiments.report.photos import photo
 
     if not told.robots:
         return []
@@ -154,7 +155,7 @@ def _photos(told: Told, level: str) -> list[str]:
         try:
             picture = photo(told, told.robots[0], time)
         except SimulationError as fault:
-            return [f'<p class="quiet">{escape(why_none(fault))}</p>']
+            return [f'<p class="quiet">{escape(f"Pictures are left out: {fault}.")}</p>']
         if picture is not None:
             text = escape(f"{time:.2f} s, {name}")
             figures.append(
@@ -188,11 +189,6 @@ def _faults(faults: Sequence[Mapping[str, Any]]) -> str:
         rows.append(["", mark, name_cell(fault["name"]), *map(_number, times), cell(fault["effect"])])
     heads = ["", "fault", "from", "to", "effect"]
     return table("What was let go wrong, and what came of it where it acted", heads, rows)
-
-
-def _again(verdict: Mapping[str, Any]) -> str:
-    command = verdict.get("command")
-    return f"<p>Run it again:</p><pre>{escape(command)}</pre>" if command else ""
 
 
 def _made_with(verdict: Mapping[str, Any]) -> str:

@@ -6,7 +6,6 @@ import base64
 import io
 import math
 
-from twin.errors import SimulationError
 from twin.experiments.report.told import Told
 from twin.geometry import yaw_from_quat_wxyz
 from twin.sim.photo import Camera, take
@@ -22,17 +21,14 @@ def photo(told: Told, robot: str, time_s: float) -> str | None:
     Raises:
         SimulationError: There is no OpenGL without a display here.
     """
-    scene = told.scene
-    time_ns = round(time_s * 1e9)
-    pose = None if scene is None else scene.pose(told.base(robot), time_ns)
-    if scene is None or pose is None:
+    scene, time_ns = told.scene, round(time_s * 1e9)
+    if scene is None or (pose := scene.pose(told.base(robot), time_ns)) is None:
         return None
-    solids = scene.solids(time_ns)
     size = _size(told, robot)
     looking = math.degrees(yaw_from_quat_wxyz(pose.quat_wxyz) + _SIDEWAYS) + 180.0
     x, y, z = pose.xyz.tolist()
     camera = Camera(lookat=(x, y, z + 0.6 * size), distance=5.0 * size, azimuth=looking, elevation=-32.0)
-    picture = take(solids, camera, *_SIZE)
+    picture = take(scene.solids(time_ns), camera, *_SIZE)
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -45,18 +41,5 @@ def _size(told: Told, robot: str) -> float:
     assert told.scene is not None
     paths = told.scene.paths
     base = paths[told.base(robot)][1][0][:3]
-    return max(
-        [
-            0.3,
-            *(
-                math.dist(base, poses[0][:3])
-                for name, (_, poses) in paths.items()
-                if name.startswith(f"{robot}/")
-            ),
-        ]
-    )
-
-
-def why_none(fault: SimulationError) -> str:
-    """Return why there are no pictures, as a sentence."""
-    return f"Pictures are left out: {fault}."
+    starts = (poses[0][:3] for name, (_, poses) in paths.items() if name.startswith(f"{robot}/"))
+    return max([0.3, *(math.dist(base, start) for start in starts)])

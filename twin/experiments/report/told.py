@@ -78,8 +78,8 @@ class Told:
     folder: Path
     verdict: Mapping[str, Any]
     recording: Recording | None
-    missing: str = ""
-    """Why there is no recording; a sentence."""
+    missing: str
+    """Why there is no recording, if there is none; a sentence."""
 
     @property
     def title(self) -> str:
@@ -161,19 +161,15 @@ class Told:
             if path.endswith("mission/state") and "StateChange:state" in self._columns(path):
                 column = self._columns(path)["StateChange:state"]
                 times = [*(column.times_ns * 1e-9), max(self.end_s, column.times_ns[-1] * 1e-9)]
-                names = [row[0] for row in column.values]
-                found += [
-                    State(times[i], times[i + 1], name.rpartition(": ")[2]) for i, name in enumerate(names)
-                ]
+                names = [row[0].rpartition(": ")[2] for row in column.values]
+                found += map(State, times, times[1:], names)
         return found
 
     @property
     def sights(self) -> list[tuple[float, str]]:
         """Times [s] and names of what is to be seen: start, end, moments, then states of the mission."""
         found = [(0.0, "start"), (self.end_s, "end")]
-        found += [
-            (moment.time_s, f"{number}: {moment.title}") for number, moment in enumerate(self.moments, 1)
-        ]
+        found += [(moment.time_s, f"{i}: {moment.title}") for i, moment in enumerate(self.moments, 1)]
         return found + [((state.start_s + state.end_s) / 2.0, state.name) for state in self.states]
 
     @cached_property
@@ -200,10 +196,9 @@ class Told:
         """What is worth a look, in the order of time: what failed, what came near to it, warnings."""
         found = []
         for check in self.verdict["checks"]:
-            at = moment_of(check)
-            if at is None or (
-                check["passed"] and (at > self.end_s - _END_S or not _is_measured(check["value"]))
-            ):
+            at, value = moment_of(check), check["value"]
+            shows = isinstance(value, float) and value != 0.0  # neither yes or no, nor nothing at all
+            if at is None or (check["passed"] and (at > self.end_s - _END_S or not shows)):
                 continue
             title = check["name"] if check["passed"] else f"{check['name']} fails"
             text = check["reason"] or "nearest to its limit"
@@ -218,18 +213,11 @@ class Told:
         for robot in self.robots:
             for name, times, values in self.series(f"/localisation/{robot}/"):
                 if name == "position_error" and len(values):
-                    i = int(np.argmax(values))
-                    found.append(
-                        Moment(
-                            float(times[i]),
-                            "largest localisation error",
-                            f"{robot}: {values[i] * 1e3:.0f} mm",
-                        )
-                    )
-        found += [
-            Moment(line.time_s, line.level.lower(), line.text, line.level != "WARN")
-            for line in [each for each in self.log if each.level in _BAD and "[faults]" not in each.text][:4]
-        ]
+                    most = int(np.argmax(values))
+                    text = f"{robot}: {values[most] * 1e3:.0f} mm"
+                    found.append(Moment(float(times[most]), "largest localisation error", text))
+        loud = [line for line in self.log if line.level in _BAD and "[faults]" not in line.text][:4]
+        found += [Moment(at, level.lower(), text, level != "WARN") for at, level, text in loud]
         found.sort(key=lambda moment: not moment.bad)
         return sorted(found[:_MOST_MOMENTS], key=lambda moment: moment.time_s)
 
@@ -255,13 +243,13 @@ def read_run(folder: Path) -> Told:
         RecordingError: It holds no verdict, or one that cannot be read.
     """
     verdict = read_verdict(folder)
-    files = sorted(folder.glob("*.rrd"))
-    if not files:
-        return Told(folder=folder, verdict=verdict, recording=None, missing="The run was not recorded.")
-    try:
-        return Told(folder=folder, verdict=verdict, recording=read(files[0]))
-    except RecordingError as fault:
-        return Told(folder=folder, verdict=verdict, recording=None, missing=f"{fault}.")
+    recording, missing = None, "The run was not recorded."
+    if files := sorted(folder.glob("*.rrd")):
+        try:
+            recording = read(files[0])
+        except RecordingError as fault:
+            missing = f"{fault}."
+    return Told(folder=folder, verdict=verdict, recording=recording, missing=missing)
 
 
 def _seconds(times_ns: NDArray[np.int64]) -> Array:
@@ -271,8 +259,3 @@ def _seconds(times_ns: NDArray[np.int64]) -> Array:
 def _joined(strips: list[Array]) -> Array:
     """Return one line of segments that follow each other."""
     return np.concatenate([strips[0], *(s[1:] for s in strips[1:])]) if strips else np.zeros((0, 2))
-
-
-def _is_measured(value: object) -> bool:
-    """Whether there is something to see of a check that holds: neither yes or no, nor nothing at all."""
-    return isinstance(value, float) and value != 0.0

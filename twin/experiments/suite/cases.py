@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from twin.errors import Problem, ScenarioError, TwinError
 from twin.experiments.short_names import short_names
@@ -51,8 +52,9 @@ class Case:
 
     @property
     def folder(self) -> str:
-        """A name for the folder of its results."""
-        return re.sub(r"[^\w.=,+-]+", "-", self.name).strip("-")[:150]
+        """A name for the folder of its results; a long one is cut, with a checksum of the whole."""
+        plain = re.sub(r"[^\w.=,+-]+", "-", self.name).strip("-")
+        return plain if len(plain) <= 150 else f"{plain[:141]}-{crc32(self.name.encode()):08x}"
 
 
 def cases_in(files: Iterable[Path]) -> list[Case]:

@@ -14,7 +14,6 @@ from twin.files.writing import make_folder
 
 Result = Mapping[str, Any]
 """The content of a run's `verdict.json`."""
-_WAIT_S = 60.0
 
 
 class Runner:
@@ -57,10 +56,7 @@ class Runner:
 
     def wait(self) -> list[tuple[Job, Result]]:
         """Return runs that have ended, with their results; waits for the first of them."""
-        while True:
-            ended = self._processes.wait(_WAIT_S)
-            if ended:
-                return [(job, _told(job, result)) for job, result in ended]
+        return [(job, _told(job, result)) for job, result in self._processes.wait()]
 
     def run(self, job: Job) -> Result:
         """Make one run alone; raises RecordingError if its folder cannot be made."""

@@ -1,4 +1,4 @@
-"""The mutants that ship, each made of a function whose docstring says what is wrong."""
+"""The mutants that ship, most of them made of a function whose docstring says what is wrong."""
 
 from __future__ import annotations
 

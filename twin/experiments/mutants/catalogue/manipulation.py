@@ -50,25 +50,19 @@ def early_gripper(site: Site) -> None:
     site.patch(MobileManipulationNode, "reach_for_tote", short)
 
 
-@_of_goods
-@installs
-def early_release(site: Site) -> None:
-    """The gripper opens 12 cm above the table."""
-    _plan(site, set_down_clearance=0.12, lift_off=0.12)
+def _plans(says: str, **distances: Any) -> type[Mutant]:
+    """Make a mutant that changes distances of the plan of picking and placing."""
+
+    def change(site: Site) -> None:
+        site.patch(PickAndPlaceNode, "config", replace(PickAndPlaceNode.config, **distances))
+
+    change.__doc__ = says
+    return _of_goods(installs(change))
 
 
-@_of_goods
-@installs
-def shallow_place(site: Site) -> None:
-    """Goods are set down on the edge of the table."""
-    _plan(site, place_depth=0.04)
-
-
-@_of_goods
-@installs
-def low_carry(site: Site) -> None:
-    """Goods are drawn out of the shelf without being lifted."""
-    _plan(site, lift_off=0.0)
+early_release = _plans("The gripper opens 12 cm above the table.", set_down_clearance=0.12, lift_off=0.12)
+shallow_place = _plans("Goods are set down on the edge of the table.", place_depth=0.04)
+low_carry = _plans("Goods are drawn out of the shelf without being lifted.", lift_off=0.0)
 
 
 @_of_goods
@@ -81,33 +75,25 @@ def approach_offset(data: dict[str, Any]) -> None:
             group(types, name)["external_detection_translation_x"] = "-0.43 m"
 
 
-@_of_goods
-@installs
-def arm_offset(site: Site) -> None:
-    """The robot takes its gripper to be 8 cm nearer than it is."""
-    _calibrate(site, grasp_length=-0.08)
+def _calibrates(says: str, **offsets: float) -> type[Mutant]:
+    """Make a mutant that changes what is known of the arm."""
+
+    def change(site: Site) -> None:
+        real = from_description.manipulator
+
+        def wrong(description: Any) -> Any:
+            found = real(description)
+            if found is not None:
+                config = found.arm.config
+                shifted = {name: getattr(config, name) + offset for name, offset in offsets.items()}
+                found.arm.config = replace(config, **shifted)
+            return found
+
+        site.patch(from_description, "manipulator", wrong)
+
+    change.__doc__ = says
+    return _of_goods(installs(change))
 
 
-@_of_goods
-@installs
-def lift_offset(site: Site) -> None:
-    """The robot takes its gripper to be 5 cm lower than it is."""
-    _calibrate(site, grasp_z=-0.05)
-
-
-def _plan(site: Site, **distances: Any) -> None:
-    site.patch(PickAndPlaceNode, "config", replace(PickAndPlaceNode.config, **distances))
-
-
-def _calibrate(site: Site, **offsets: float) -> None:
-    real = from_description.manipulator
-
-    def wrong(description: Any) -> Any:
-        found = real(description)
-        if found is not None:
-            config = found.arm.config
-            shifted = {name: getattr(config, name) + offset for name, offset in offsets.items()}
-            found.arm.config = replace(config, **shifted)
-        return found
-
-    site.patch(from_description, "manipulator", wrong)
+arm_offset = _calibrates("The robot takes its gripper to be 8 cm nearer than it is.", grasp_length=-0.08)
+lift_offset = _calibrates("The robot takes its gripper to be 5 cm lower than it is.", grasp_z=-0.05)
