@@ -198,6 +198,14 @@ def test_faults_behind_other_faults_are_found_in_the_same_go(tmp_path: Path) -> 
     ]
 
 
+def test_a_key_that_is_less_alike_is_suggested_but_its_value_not_held_against_the_suggestion(
+    tmp_path: Path,
+) -> None:
+    assert faults(tmp_path, "name: a\nphysics:\n  testing: 1 kg\n") == [
+        "file.yaml:3: unknown key 'testing' in physics; did you mean 'timestep'? Valid: timestep",
+    ]
+
+
 def test_a_misspelling_hides_no_fault_behind_it_and_makes_none(tmp_path: Path) -> None:
     assert faults(tmp_path, "nme: 3\nphysics:\n  tmestep: 1 kg\n") == [
         "file.yaml:1: unknown key 'nme'; did you mean 'name'? "

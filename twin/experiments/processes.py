@@ -189,8 +189,9 @@ def _serve(work: Callable[[Any], Any], pipe: Connection, log: Path | None) -> No
             result = work(job)
         except Exception as fault:
             result = fault
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):  # a disk that is full: what was printed is lost, the result is not
+                stream.flush()
         pipe.send(result)
 
 

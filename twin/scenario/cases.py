@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
@@ -10,6 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from twin.parameters import NotNegative
 from twin.scenario.fields import faultless
+from twin.scenario.seeds import parse_seeds
 from twin.strict_yaml import Fault, StrictModel
 
 MOST = 10_000
@@ -24,17 +24,11 @@ _SEEDS_SCHEMA = {
 
 
 def _seeds(value: object) -> object:
-    """Return the seeds of a text such as `1..10`."""
     if value == []:
         raise ValueError("must have at least one seed")
     if not isinstance(value, str):
         return tuple(value) if isinstance(value, list) else value
-    ends = re.fullmatch(r"(\d{1,19})\.\.(\d{1,19})", value.strip())
-    if ends is None or int(ends[1]) > int(ends[2]):
-        raise ValueError("must be a list of seeds or a range such as 1..10")
-    if int(ends[2]) - int(ends[1]) >= MOST:
-        raise ValueError(f"must be at most {MOST} seeds, not {value}")
-    return tuple(range(int(ends[1]), int(ends[2]) + 1))
+    return parse_seeds(value, MOST)
 
 
 def _tag(value: str) -> str:
@@ -60,7 +54,7 @@ class CasesConfig(StrictModel):
     """How `twin test` and pytest run the file; `twin run` runs it once, whatever stands here."""
 
     seeds: Seeds = ()
-    """One test for each seed: a list, or a range with both ends, `1..10`; absent: the file's."""
+    """One test for each seed: a list, or a range, `1..10` with both ends, `0:10` without 10; absent: the file's."""
     grid: Mapping[str, Values] = {}
     """Keys with dots, as `robots.0.pose.x`, each with a list of values: one test for each combination."""
     tags: tuple[Tag, ...] = ()

@@ -51,6 +51,8 @@ class Finding(NamedTuple):
     """The key or value that was probably meant."""
 
 
+_SURE = 0.75
+"""So alike is `sise` to `size`; what is less, such as `duration` to `duplication`, may have meant another key."""
 _WORDS = MappingProxyType(
     {
         "float_type": "must be a number",
@@ -144,8 +146,8 @@ def _unknown(at: Loc, key: str, valid: Sequence[str]) -> Finding:
 
 
 def _closest(word: str, valid: Sequence[str]) -> str | None:
-    """Return the name that `nearest` suggests."""
-    return next(iter(difflib.get_close_matches(word, sorted(valid), n=1, cutoff=0.5)), None)
+    """Return the name that was surely meant; `nearest` suggests some that may not have been."""
+    return next(iter(difflib.get_close_matches(word, sorted(valid), n=1, cutoff=_SURE)), None)
 
 
 M = TypeVar("M", bound=BaseModel)
@@ -163,8 +165,7 @@ def validate(schema: type[M], document: Document, more: Mapping[str, Any] = Mapp
     data, meant = _corrected(document, first)
     _, second = findings(schema, data, context)
     found = [finding for finding in first if finding.kind != "missing key" or finding.loc not in meant]
-    # Where a corrected key's value is wrong the key was perhaps another one: that fault may be made up.
-    known = {finding.loc for finding in found} | meant
+    known = {finding.loc for finding in found}
     found += [finding for finding in second if not any(_above(finding.loc, loc) for loc in known)]
     document.problems += [document.problem(finding.loc, finding.message) for finding in dict.fromkeys(found)]
     return None

@@ -35,16 +35,18 @@ TWELVE: dict[str, Any] = {
         "steps": [{"duration": "10 s", "linear": "0.2 m/s", "angular": "20 deg/s"}],
     },
     "faults": [
-        {"lidar": {"at": "0.2 s", "kind": "stop"}},
-        {"lidar": {"at": "0.4 s", "kind": "freeze", "duration": "1 s"}},
-        {"encoder": {"joint": "wheel_left_joint", "factor": 1.0, "at": "0.5 s"}},
+        {"noise": {"sensor": "scan", "stddev": 0.05, "at": "0.2 s", "duration": "1 s"}},
+        {"bias": {"sensor": "imu", "field": "angular_velocity.z", "by": 0.1, "when": {"driven": "10 cm"}}},
+        {"dropout": {"sensor": "imu", "share": "30 %", "when": {"fault": "noise"}, "after": "0.1 s"}},
         {"odometry_jump": {"at": "0.6 s", "distance": "1 mm"}},
-        {"lidar": {"at": "0.7 s", "kind": "nan"}},
-        {"odometry_jump": {"at": "0.8 s", "yaw": "0.01 deg"}},
-        {"encoder": {"joint": "wheel_right_joint", "factor": 0.6, "at": "1 s"}},
+        {"delay": {"sensor": "scan", "time": "80 ms", "at": "0.4 s"}},
+        {"link_delay": {"time": "20 ms", "topic": "/scan", "when": {"fault": "bias"}}},
+        {"encoder": {"joint": "wheel_right_joint", "factor": 0.6, "when": {"driven": "15 cm"}}},
         {"lidar": {"at": "1.1 s", "kind": "blind"}},
-        {"odometry_jump": {"at": "1.2 s", "distance": "-1 mm"}},
-        {"encoder": {"joint": "wheel_right_joint", "factor": 0.6, "at": "1.95 s"}},
+        {"duplication": {"share": "50 %", "topic": "/imu"}},
+        {"mass": 1.02},
+        {"pallet": {"pose": {"x": "-4 m"}, "when": {"fault": "encoder"}}},
+        {"encoder": {"label": "late", "joint": "wheel_right_joint", "factor": 0.6, "at": "1.95 s"}},
     ],
     "checks": [{"driven_distance": {"min": "0.2 m"}}, {"odometry_drift": {"max": "3 cm"}}],
 }
@@ -61,7 +63,7 @@ def test_of_twelve_faults_the_one_that_matters_is_left(tmp_path: Path) -> None:
     assert found.left == ("faults.0 encoder",)
     assert found.source.data["faults"] == [TWELVE["faults"][6]]
     assert found.checks == ("odometry_drift",)
-    assert {"robots.0.command_latency: 20 ms", "world.obstacles.0 box", "faults.9 encoder"} <= set(
+    assert {"robots.0.command_latency: 20 ms", "world.obstacles.0 box", "faults.11 encoder"} <= set(
         found.removed
     )
 

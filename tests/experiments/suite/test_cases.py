@@ -78,6 +78,11 @@ def test_names_of_keys_are_as_long_as_it_takes_to_tell_them_apart(tmp_path: Path
     assert [case.name for case in cases_of(file)] == ["demo[0.pose.x=1,1.pose.x=-1]"]
 
 
+def test_seeds_are_written_as_for_a_sweep(tmp_path: Path) -> None:
+    for text in ("1..3", "1:4", '"1, 2:4"'):
+        assert [case.seed for case in cases_in([write(tmp_path, f"test: {{seeds: {text}}}\n")])] == [1, 2, 3]
+
+
 def test_a_test_keeps_its_number_whichever_are_chosen(tmp_path: Path) -> None:
     cases = cases_in([write(tmp_path, "test: {seeds: 1..4}\n")])
     assert [case.number for case in selected(cases, shard=(2, 2))] == [2, 4]
@@ -92,10 +97,11 @@ def test_twin_run_does_not_look_at_the_key(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("test", "says"),
     [
-        ("seeds: 9..3", "file.yaml:7: test.seeds: must be a list of seeds or a range such as 1..10, not"),
+        ("seeds: 9..3", "file.yaml:7: test.seeds: has no seed in 9..3; the first number must be less than"),
+        ("seeds: 1.5..3", r"test.seeds: must be a list of seeds, 1,5,9, or a range such as 1..10 or 0:1000"),
         ("seeds: []", "file.yaml:7: test.seeds: must have at least one seed"),
         ("seeds: [-1]", "file.yaml:7: test.seeds.0: must be at least 0"),
-        ("seeds: 0..99999999999", "must be at most 10000 seeds"),
+        ("seeds: 0..99999999999", "test.seeds: must be at most 10000 seeds"),
         ("seeds: 1..5000, grid: {duration: [1, 2, 3]}", "file.yaml:7: test makes 15000 tests; at most 10000"),
         ("tags: [a-b]", "test.tags.0: must be a word of letters, digits and _, such as quick, not 'a-b'"),
         ("grid: {duration: []}", "file.yaml:7: test.grid.duration: must have at least 1 items"),

@@ -78,7 +78,7 @@ def test_each_run_has_its_verdict_whatever_becomes_of_the_others(in_turn: list[d
     assert words == ["pass", "pass", "error", "error", "fail", "pass", "pass", "error"]
     wrong, test, dies = (str(result["error"]) for result in in_turn if result["error"])
     assert "no robot 'diff_bto'" in wrong
-    assert "must be a list of seeds or a range such as 1..10, not '2..1'" in test
+    assert "has no seed in 2..1; the first number must be less than the second, not '2..1'" in test
     assert dies.startswith(
         "the run's process was killed by SIGKILL; the system does so when memory runs out: it"
     )

@@ -51,13 +51,15 @@ def test_what_is_no_axis_is_told(word: str, said: str) -> None:
         parse_axis(word)
 
 
-def test_seeds_count_as_pythons_range() -> None:
+def test_seeds_count_as_pythons_range_or_have_both_ends() -> None:
+    assert parse_seeds("1..4, 7:9") == (1, 2, 3, 4, 7, 8)
+    assert parse_seeds("3..3") == (3,)
     assert parse_seeds("0:4") == (0, 1, 2, 3)
     assert parse_seeds("0:10:4, 1") == (0, 4, 8, 1)
     assert parse_seeds("7") == (7,)
 
 
-@pytest.mark.parametrize("text", ["", "a", "3:1", "1,1", "0:5,4", "-1", "0:4:0", "1:2:3:4", "0:9999999"])
+@pytest.mark.parametrize("text", ["", "a", "3:1", "1,1", "0:5,4", "-1", "0:4:0", "1:2:3:4", "0:9999999", "4..1", "1..", "0:99999999999999999999", "9223372036854775808"])
 def test_what_are_no_seeds_is_told(text: str) -> None:
     with pytest.raises(ScenarioError, match="--seeds"):
         parse_seeds(text)

@@ -39,7 +39,7 @@ def sweep(
     ] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(help="0:1000 for a thousand, or 1,5,9.", show_default="the scenario's one seed"),
+        typer.Option(help="0:1000 for a thousand, or 1..10, or 1,5,9.", show_default="the scenario's one seed"),
     ] = None,
     sample: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Draw N times of the intervals: Latin hypercube.")
@@ -93,7 +93,6 @@ def sweep(
     from twin.experiments.sweep.plan import make_plan
     from twin.experiments.sweep.summary import summarise
     from twin.experiments.sweep.sweep import sweep as run_sweep
-    from twin.files.writing import make_folder
     from twin.scenario.verdict import EXIT_CODES
 
     sigterm_is_ctrl_c()
@@ -106,7 +105,7 @@ def sweep(
         pass_rate=pass_rate,
         confidence=confidence,
     )
-    folder = make_folder(out or Path("runs") / plan.name / f"sweep-{plan.identity[:8]}")
+    folder = out or Path("runs") / plan.name / f"sweep-{plan.identity[:8]}"
     backend = _backend(ray, jobs, folder, time_limit)
     try:
         with _progress(plan.name) as progress:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from twin.errors import ScenarioError
+from twin.scenario import seeds
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _UNIT = r"\s*(?P<unit>[A-Za-z%°µ][^\s,:]*)?"
 _STEPS = re.compile(rf"(?P<first>{_NUMBER}):(?P<last>{_NUMBER}):(?P<step>{_NUMBER}){_UNIT}")
 _INTERVAL = re.compile(rf"(?P<low>{_NUMBER})\.\.(?P<high>{_NUMBER}){_UNIT}")
-_SEEDS = re.compile(r"(\d+)(?::(\d+)(?::(\d+))?)?")
 _MOST = 1_000_000
 """Values of an axis, seeds, runs in all."""
 _DIGITS = 6
@@ -96,25 +96,11 @@ def _steps(word: str, part: str) -> list[str]:
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Read seeds: `0:1000` (without its end, a thousand), `0:1000:10`, `7`, `1,5,9`.
-
-    Raises:
-        ScenarioError: It is none of these, or a seed is there twice.
-    """
-    seeds: list[int] = []
-    for part in text.split(","):
-        found = _SEEDS.fullmatch(part.strip())
-        if found is None or found[3] == "0":
-            raise ScenarioError(f"--seeds {text}: must be such as 0:1000, which are 1000 seeds, or 1,5,9")
-        first, last, step = int(found[1]), int(found[2] or int(found[1]) + 1), int(found[3] or 1)
-        if first >= 1 << 63 or len(range(first, last, step)) > _MOST:
-            raise ScenarioError(f"--seeds {text}: at most {_MOST} seeds, each of at most 63 bits")
-        seeds += range(first, last, step)
-    if not seeds:
-        raise ScenarioError(f"--seeds {text}: no seed; the first number must be less than the second")
-    if len(set(seeds)) < len(seeds):
-        raise ScenarioError(f"--seeds {text}: a seed is there twice")
-    return tuple(seeds)
+    """Read `--seeds`; raises ScenarioError."""
+    try:
+        return seeds.parse_seeds(text, _MOST)
+    except ValueError as wrong:
+        raise ScenarioError(f"--seeds {text}: {wrong}") from None
 
 
 def points(axes: Sequence[Axis], samples: int | None) -> tuple[dict[str, str], ...]:

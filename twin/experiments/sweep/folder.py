@@ -129,9 +129,9 @@ class ResultFolder:
                     return False
                 lock.unlink(missing_ok=True)
                 continue
+            self._held.add(run.key)  # from now on: a disk that is full leaves no lock of nobody
             with os.fdopen(descriptor, "w") as stream:
                 stream.write(f"{socket.gethostname()}-{os.getpid()}")
-            self._held.add(run.key)
             return True
         return False
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -96,7 +97,8 @@ def sweep(
         except TwinError as fault:  # a process could not write, or the cluster is gone
             raise type(fault)(f"{fault}{_KEEPS}") from None
         except OSError as fault:
-            raise RecordingError(f"{path}: cannot be written: {fault.strerror}{_KEEPS}") from fault
+            why = os.strerror(fault.errno) if fault.errno else fault  # pyarrow's own text is long
+            raise RecordingError(f"{path}: cannot be written: {why}{_KEEPS}") from fault
         finally:
             folder.close()
     finally:
