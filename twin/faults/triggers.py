@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection
 from fnmatch import fnmatchcase
 
 from twin.errors import nearest
 from twin.faults.fault import FaultContext, Robot, refuse
 from twin.geometry import Pose2
-from twin.scenario.faults import Near, When
+from twin.scenario.faults import When
 from twin.scenario.observation import Zone
 
 Waiting = Callable[[], bool]
@@ -34,7 +33,8 @@ def waiting(when: When, robot: str | None, context: FaultContext, begun: Collect
         return context.world.pose(robot.handle.base).to_pose2()
 
     if (near := when.near) is not None:
-        return lambda: any(_is_near(pose(robot), near) for robot in robots)
+        middle = Pose2(near.x, near.y, 0.0)
+        return lambda: any(pose(robot).distance(middle) <= near.within for robot in robots)
     if when.zone is not None:
         if when.zone not in context.zones:
             valid = nearest(when.zone, context.zones) if context.zones else "the world has no zones"
@@ -51,10 +51,6 @@ def waiting(when: When, robot: str | None, context: FaultContext, begun: Collect
         return lambda: max(way.to(pose(it)) for way, it in zip(ways, robots, strict=True)) >= far
     other = when.fault
     return lambda: other in begun
-
-
-def _is_near(pose: Pose2, near: Near) -> bool:
-    return math.hypot(pose.x - near.x, pose.y - near.y) <= near.within
 
 
 def _is_in(pose: Pose2, zone: Zone) -> bool:

@@ -2,25 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twin.errors import TwinError
-from twin.experiments.diff.bracket import Bracket, bracket
 from twin.experiments.diff.changes import changes, since
 from twin.experiments.diff.difference import PHYSICS, Difference, Divergence, Value
 from twin.experiments.diff.fields import differences
 from twin.experiments.diff.replay import Message, Replay
 from twin.experiments.diff.side import Side, why_not_alone
+from twin.recording.hashes import RunHashes
 
 if TYPE_CHECKING:
     from twin.runtime import Progress
 
 _Placed = tuple[int, Divergence]
 """A difference, and where its message is among those of all topics."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bracket:
+    """Seconds, counted from 0, in which hashes first differ; None: in no second."""
+
+    messages: int | None
+    physics: int | None
+    topics: tuple[str, ...]
+    """Topics with types that differ in the second of `messages`; empty: only the order among them does."""
+
+    @property
+    def first(self) -> int | None:
+        """The earlier of the two."""
+        return min((second for second in (self.messages, self.physics) if second is not None), default=None)
 
 
 def compare(a: Side, b: Side, progress: Callable[[Progress], None] | None = None) -> Difference:
@@ -31,7 +47,7 @@ def compare(a: Side, b: Side, progress: Callable[[Progress], None] | None = None
         b: The other.
         progress: Called about four times a second while they are made again.
     """
-    found = bracket(a.run.hashes, b.run.hashes)
+    found = _bracket(a.run.hashes, b.run.hashes)
     digests = (a.run.digest, b.run.digest)
     same = found.first is None and (None in digests or digests[0] == digests[1])
     first: list[Divergence] = []
@@ -54,6 +70,24 @@ def compare(a: Side, b: Side, progress: Callable[[Progress], None] | None = None
         first=tuple(first),
         notes=tuple(notes),
     )
+
+
+def _bracket(a: RunHashes, b: RunHashes) -> Bracket:
+    """Return where the hashes of two runs first differ."""
+    messages = _first(a.stream, b.stream)
+    topics: list[str] = []
+    if messages is not None:
+        names = sorted({*a.topics, *b.topics})
+        topics = [
+            name
+            for name in names
+            if a.topics.get(name, {}).get(messages) != b.topics.get(name, {}).get(messages)
+        ]
+    return Bracket(messages=messages, physics=_first(a.physics, b.physics), topics=tuple(topics))
+
+
+def _first(a: Sequence[int], b: Sequence[int]) -> int | None:
+    return next((i for i, (one, other) in enumerate(zip_longest(a, b)) if one != other), None)
 
 
 def _replay(
