@@ -39,7 +39,9 @@ def sweep(
     ] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(help="0:1000 for a thousand, or 1..10, or 1,5,9.", show_default="the scenario's one seed"),
+        typer.Option(
+            help="0:1000 for a thousand, or 1..10, or 1,5,9.", show_default="the scenario's one seed"
+        ),
     ] = None,
     sample: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Draw N times of the intervals: Latin hypercube.")
