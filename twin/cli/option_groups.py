@@ -9,6 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
+from twin.cli import completion
+
+scenario_argument = functools.partial(typer.Argument, show_default=False, autocompletion=completion.scenarios)
 Overrides = Annotated[
     list[str] | None,
     typer.Option(metavar="KEY=VALUE", help="Change one value of the file; may be repeated."),

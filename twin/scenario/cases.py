@@ -54,7 +54,7 @@ class CasesConfig(StrictModel):
     """How `twin test` and pytest run the file; `twin run` runs it once, whatever stands here."""
 
     seeds: Seeds = ()
-    """One test for each seed: a list, or a range, `1..10` with both ends, `0:10` without 10; absent: the file's."""
+    """One test for each seed: a list, or a range, `1..10` or `0:10` (without 10); absent: the file's."""
     grid: Mapping[str, Values] = {}
     """Keys with dots, as `robots.0.pose.x`, each with a list of values: one test for each combination."""
     tags: tuple[Tag, ...] = ()

@@ -17,11 +17,19 @@ def quantity(value: float | bool | None, unit: str, limit: float | bool | None) 
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if unit in ("rad", "rad/s"):
-        value, unit = math.degrees(value), unit.replace("rad", "deg")
+    value, unit = in_degrees(value, unit)
     if unit == "m" and limit is not None and 0.0 < limit < 0.1 and value < 1.0:
         value, unit = value * 1e3, "mm"
     return f"{round(value, 3) + 0.0:.5g} {unit}".rstrip()  # + 0.0: no sign of a zero
+
+
+def in_degrees(value: float, unit: str) -> tuple[float, str]:
+    """Return an angle, or a rate of one, in degrees; everything else as it is.
+
+    >>> in_degrees(math.pi, "rad/s"), in_degrees(2.0, "m")
+    ((180.0, 'deg/s'), (2.0, 'm'))
+    """
+    return (math.degrees(value), f"deg{unit[3:]}") if unit.split("/")[0] == "rad" else (value, unit)
 
 
 def seconds(value: float | None, digits: int = 1) -> str:

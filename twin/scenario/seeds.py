@@ -22,7 +22,7 @@ def parse_seeds(text: str, most: int) -> tuple[int, ...]:
     for part in text.split(","):
         found = _PART.fullmatch(part.strip())
         if found is None or found[4] == "0":
-            raise ValueError("must be a list of seeds, 1,5,9, or a range such as 1..10 or 0:1000 (without 1000)")
+            raise ValueError("must be a list of seeds, 1,5,9, or a range such as 1..10 or 0:10 (without 10)")
         first, end = int(found[1]), int(found[3] or int(found[2] or found[1]) + 1)
         if first >= end:
             raise ValueError(f"has no seed in {part.strip()}; the first number must be less than the second")

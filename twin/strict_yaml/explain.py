@@ -52,7 +52,7 @@ class Finding(NamedTuple):
 
 
 _SURE = 0.75
-"""So alike is `sise` to `size`; what is less, such as `duration` to `duplication`, may have meant another key."""
+"""So alike is `sise` to `size`; what is less, such as `duration` to `duplication`, may have been another."""
 _WORDS = MappingProxyType(
     {
         "float_type": "must be a number",

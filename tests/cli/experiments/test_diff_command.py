@@ -58,7 +58,7 @@ def test_golden_and_diff_agree(spurt: Path, invoke: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (["diff", "nothing"], "no scenario 'nothing'"),
+        (["diff", "nothing", "here"], "nothing: no folder of a run, and no scenario 'nothing'"),
         (["diff", "here"], "here/hashes.json: no such file; `twin run` writes it into the folder of a run"),
         (["diff", "spurt.yaml", "here", "--set", "seed=2"], "here: this run is over"),
         (["diff", "spurt.yaml", "--set", "sed=2"], "unknown key 'sed'"),
@@ -72,3 +72,14 @@ def test_trouble_is_one_sentence(spurt: Path, invoke: Any, arguments: list[str],
     assert (code, out) == (2, "")
     assert why in " ".join(err.replace("│", " ").split())
     assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize(
+    "other", [["nothing"], ["here"], ["spurt.yaml", "--set", "sed=2"], ["--set", "sed=2"]]
+)
+def test_nothing_is_run_before_both_are_known(
+    spurt: Path, invoke: Any, monkeypatch: pytest.MonkeyPatch, other: list[str]
+) -> None:
+    Path("here").mkdir()
+    monkeypatch.setattr("twin.experiments.diff.side.OpenRun", None)
+    assert invoke("diff", "spurt.yaml", *other)[0] == 2

@@ -59,7 +59,11 @@ def test_seeds_count_as_pythons_range_or_have_both_ends() -> None:
     assert parse_seeds("7") == (7,)
 
 
-@pytest.mark.parametrize("text", ["", "a", "3:1", "1,1", "0:5,4", "-1", "0:4:0", "1:2:3:4", "0:9999999", "4..1", "1..", "0:99999999999999999999", "9223372036854775808"])
+HUGE = ("0:9999999", "0:99999999999999999999", "9223372036854775808")
+WRONG = ("", "a", "3:1", "4..1", "1..", "1,1", "0:5,4", "-1", "0:4:0", "1:2:3:4", *HUGE)
+
+
+@pytest.mark.parametrize("text", WRONG)
 def test_what_are_no_seeds_is_told(text: str) -> None:
     with pytest.raises(ScenarioError, match="--seeds"):
         parse_seeds(text)

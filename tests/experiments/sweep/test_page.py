@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 import pytest
+from rich.console import Console
 
 from tests.experiments.sweep.conftest import LIMIT, SPEED, MakePlan
+from twin.cli.experiments.sweep_table import sweep_report
 from twin.experiments.short_names import short_names
 from twin.experiments.sweep.folder import ResultFolder
 from twin.experiments.sweep.judging import PointJudge
@@ -95,3 +99,20 @@ def test_a_table_keeps_units_types_and_checks_of_one_name(plan: MakePlan, tmp_pa
 def test_names_are_as_short_as_they_can_be() -> None:
     keys = ["mission.steps.0.linear", "mission.steps.1.linear", "duration", "checks.0"]
     assert list(short_names(keys).values()) == ["steps.0.linear", "steps.1.linear", "duration", "checks.0"]
+
+
+def test_the_table_fits_a_terminal_and_has_angles_in_degrees(plan: MakePlan, tmp_path: Path) -> None:
+    planned = plan(f"{SPEED}=0.1,0.2", "mission.steps.0.angular=10 deg/s,20 deg/s", seeds=range(3))
+    found = result(planned, tmp_path / "out")
+    for _, one in found.runs:
+        named = {"always(mission_state == 'a' implies clearance > 30 cm)": "m", "heading at the end": "rad"}
+        one["checks"] = [
+            {**check, "name": name, "unit": named[name]}
+            for check, name in zip(one["checks"], named, strict=False)
+        ]
+    found = replace(found, table=make_table(planned, found.runs))
+    console = Console(width=100, file=io.StringIO())
+    console.print(sweep_report(found, summarise(found)))
+    lines = console.file.getvalue().splitlines()
+    assert max(len(line.rstrip()) for line in lines if "fails:" not in line) <= 100
+    assert any(re.search(r"FAIL +0.1 +10 deg/s +2 of 3 .* 5.73 deg ", line) for line in lines)

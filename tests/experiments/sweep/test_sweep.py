@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -116,6 +117,19 @@ def test_a_full_disk_is_told_and_what_is_there_kept(six: Plan, tmp_path: Path, u
         sweep(six, out, FullDisk(5), page=False)
     assert in_turn(six, out).made == 13
     assert table(out) == undisturbed
+
+
+def test_a_disk_that_is_full_when_a_run_is_taken_leaves_no_lock(
+    six: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(descriptor: int, mode: str) -> None:
+        os.close(descriptor)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("twin.experiments.sweep.folder.os.fdopen", full)
+    with pytest.raises(RecordingError, match="No space left on device; the runs so far are kept"):
+        in_turn(six, tmp_path / "out")
+    assert not list((tmp_path / "out" / "locks").iterdir())
 
 
 _KILLED = """

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from twin.cli import completion
 from twin.cli.console import print_json
-from twin.cli.option_groups import AsJson
+from twin.cli.option_groups import AsJson, scenario_argument
 
 if TYPE_CHECKING:
     from twin.experiments.diff import Difference
@@ -18,21 +17,13 @@ if TYPE_CHECKING:
 def diff(
     a: Annotated[
         Path,
-        typer.Argument(
-            metavar="A",
-            help="Folder of a run, its hashes.json, or a scenario, which is run now.",
-            show_default=False,
-            autocompletion=completion.scenarios,
+        scenario_argument(
+            metavar="A", help="Folder of a run, its hashes.json, or a scenario, which is run now."
         ),
     ],
     b: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="B",
-            help="As A.",
-            show_default="A made again now",
-            autocompletion=completion.scenarios,
-        ),
+        scenario_argument(metavar="B", help="As A.", show_default="A made again now"),
     ] = None,
     set: Annotated[
         list[str] | None,

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from twin.cli import completion
 from twin.cli.console import print_json, stderr, stdout
-from twin.cli.option_groups import AsJson, Jobs, Overrides, Seed
+from twin.cli.option_groups import AsJson, Jobs, Overrides, Seed, scenario_argument
 
 if TYPE_CHECKING:
     from twin.experiments.shrink import Shrunk
@@ -18,13 +17,7 @@ if TYPE_CHECKING:
 
 def shrink(
     scenario: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A scenario that fails: a name, or a file.",
-            show_default=False,
-            autocompletion=completion.scenarios,
-        ),
+        Path, scenario_argument(metavar="SCENARIO", help="A scenario that fails: a name, or a file.")
     ],
     set: Overrides = None,
     seed: Seed = None,

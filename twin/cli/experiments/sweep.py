@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from twin.cli import completion
 from twin.cli.console import print_json, stderr, stdout
 from twin.cli.interrupted import sigterm_is_ctrl_c
-from twin.cli.option_groups import AsJson, Jobs
+from twin.cli.option_groups import AsJson, Jobs, scenario_argument
 
 if TYPE_CHECKING:
     from twin.experiments.sweep.making import Backend
@@ -22,13 +21,7 @@ if TYPE_CHECKING:
 
 def sweep(
     scenario: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A scenario of `twin scenarios`, or a file.",
-            show_default=False,
-            autocompletion=completion.scenarios,
-        ),
+        Path, scenario_argument(metavar="SCENARIO", help="A scenario of `twin scenarios`, or a file.")
     ],
     set: Annotated[
         list[str] | None,
@@ -39,7 +32,9 @@ def sweep(
     ] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(help="0:1000 for a thousand, or 1..10, or 1,5,9.", show_default="the scenario's one seed"),
+        typer.Option(
+            help="0:1000 for a thousand, or 1..10, or 1,5,9.", show_default="the scenario's one seed"
+        ),
     ] = None,
     sample: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Draw N times of the intervals: Latin hypercube.")

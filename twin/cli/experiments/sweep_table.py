@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 _ROWS = 24
 """More points than these are not all shown."""
-_MEDIANS = 4
+_MEDIANS = 3
 """Checks whose median has a column."""
+_WIDTH = 10
+"""Characters of such a column, whose name is folded: with two keys the table fits a terminal of 100."""
 _AGAIN = 3
 """Commands that are shown."""
 _WORST = ("error", "fail", "inconclusive", "pass")
@@ -29,7 +31,7 @@ def sweep_report(result: SweepResult, summary: SweepSummary) -> Group:
     from rich.text import Text
 
     shown = _shown(summary)
-    lines: list[RenderableType] = [_table(summary, shown)]
+    lines: list[RenderableType] = [_table(result, summary, shown)]
     if len(shown) < len(summary.points):
         lines.append(Text(f"these are the worst of {len(summary.points)} points", style="dim"))
     lines.append(_said(summary))
@@ -59,31 +61,29 @@ def _shown(summary: SweepSummary) -> list[PointSummary]:
     return [point for point in points if any(point is one for one in worst)]
 
 
-def _table(summary: SweepSummary, shown: list[PointSummary]) -> RenderableType:
+def _table(result: SweepResult, summary: SweepSummary, shown: list[PointSummary]) -> RenderableType:
     from rich.table import Table
     from rich.text import Text
 
     table = Table(title=summary.scenario, title_justify="left", title_style="bold", box=None)
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for name in short_names(list(summary.points[0].values)).values():
         table.add_column(name, justify="right", no_wrap=True)
     sure = summary.claim["confidence"] if summary.claim else 0.95
-    table.add_column("runs", justify="right")
-    table.add_column("pass rate", justify="right", no_wrap=True)
+    table.add_column("passed", justify="right", no_wrap=True)
     table.add_column(f"{100 * sure:.4g} % interval", justify="right", no_wrap=True)
     checks = list(dict.fromkeys(name for point in shown for name in point.medians))[:_MEDIANS]
     for name in checks:
-        table.add_column(Text(name), justify="right", no_wrap=True)
-    table.add_column("failed", overflow="fold")
+        table.add_column(Text(name), justify="right", overflow="fold", max_width=_WIDTH)
+    table.add_column("failed", overflow="fold", min_width=_WIDTH)
     for point in shown:
         failures = ", ".join(f"{name} {count}" for name, count in point.failures.items())
         table.add_row(
             Text(point.outcome.upper(), style=STYLE[point.outcome]),
             *map(Text, point.values.values()),
-            str(point.runs),
-            f"{100.0 * point.passed / point.runs:.4g} %",
+            f"{point.passed} of {point.runs}",
             f"{100.0 * point.least:.1f} to {100.0 * point.most:.1f} %",
-            *(f"{point.medians[name]:.4g}" if name in point.medians else "-" for name in checks),
+            *(result.table.shown(name, point.medians.get(name)) for name in checks),
             Text(failures, style="red"),
         )
     return table

@@ -12,9 +12,8 @@ from typing import Annotated, Any
 
 import typer
 
-from twin.cli import completion
 from twin.cli.console import print_json, stderr, stdout
-from twin.cli.option_groups import AsJson, Jobs
+from twin.cli.option_groups import AsJson, Jobs, scenario_argument
 from twin.cli.run.batch_progress import batch_progress
 from twin.cli.run.folders import results_folder
 from twin.cli.run.options import RunOptions
@@ -55,11 +54,10 @@ def run_in_child(options: RunOptions, out: Path) -> dict[str, Any]:
 def run_batch(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(
+        scenario_argument(
             metavar="SCENARIO",
             help="Names of scenarios, files, or folders of them.",
             show_default="the folder scenarios",
-            autocompletion=completion.scenarios,
         ),
     ] = None,
     keyword: Annotated[

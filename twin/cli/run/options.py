@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twin.bridge.wire import Wire
-from twin.cli import completion
-from twin.cli.option_groups import Overrides, Seed
+from twin.cli.option_groups import Overrides, Seed, scenario_argument
 from twin.errors import ScenarioError
 
 if TYPE_CHECKING:
@@ -27,13 +26,7 @@ class RunOptions:
     """What `twin run` was asked for: its argument and its options, in the order of its help."""
 
     scenario: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A scenario of `twin scenarios`, or a file.",
-            show_default=False,
-            autocompletion=completion.scenarios,
-        ),
+        Path, scenario_argument(metavar="SCENARIO", help="A scenario of `twin scenarios`, or a file.")
     ]
     set: Overrides = None
     seed: Seed = None

@@ -39,8 +39,8 @@ def verdict_report(verdict: Mapping[str, Any], folder: Path | None, *, short: bo
         table.add_column(column, justify="right", no_wrap=True)
     for check in verdict["checks"]:
         mark = Text("ok", style="green") if check["passed"] else Text("FAIL", style="bold red")
-        name = Text(check["name"], no_wrap=True, overflow="ellipsis")
-        table.add_row(mark, name, *numbers_of(check))
+        called = Text(check["name"], no_wrap=True, overflow="ellipsis")
+        table.add_row(mark, called, *numbers_of(check))
     lines: list[Table | Text] = [table] if verdict["checks"] else []
     lines += [_faults(verdict["faults"])] if verdict["faults"] else []
     lines += [Text(reason, style="red") for reason in reasons(verdict)]

@@ -24,7 +24,7 @@ def report_page(result: SweepResult, summary: SweepSummary) -> str:
     """Return the page of a sweep whose runs are all there: HTML with everything in it."""
     parts = [
         *_head(result, summary),
-        *_points(summary),
+        *_points(result, summary),
         *_plots(result),
         *_failures(result),
         *_made(result),
@@ -48,7 +48,7 @@ def _head(result: SweepResult, summary: SweepSummary) -> Iterable[str]:
         yield f"<p><b>Not deterministic:</b> {again}.</p>"
 
 
-def _points(summary: SweepSummary) -> Iterable[str]:
+def _points(result: SweepResult, summary: SweepSummary) -> Iterable[str]:
     points = summary.points[:_MOST_POINTS]
     keys = list(points[0].values)
     checks = list(dict.fromkeys(name for point in points for name in point.medians))
@@ -65,7 +65,7 @@ def _points(summary: SweepSummary) -> Iterable[str]:
         ]
         cells.append(_number(f"{100 * point.least:.1f} to {100 * point.most:.1f} %"))
         cells.append(f"<td class=fail>{failures}</td>")
-        cells += [_number(f"{point.medians[n]:.4g}" if n in point.medians else "-") for n in checks]
+        cells += [_number(escape(result.table.shown(name, point.medians.get(name)))) for name in checks]
         rows.append(["", *cells])
     what = "bounds of the pass rate that hold at any time, each" if summary.claim else "Clopper-Pearson,"
     medians = " Columns with names of checks: medians of what they measured." if checks else ""

@@ -15,6 +15,7 @@ from twin.experiments.report.figures import ROLES, WIDTH, figure, svg
 from twin.experiments.sequential import clopper_pearson
 from twin.experiments.short_names import short_names
 from twin.experiments.sweep.table import Column, Table
+from twin.scenario.quantities import in_degrees
 
 _GOOD, _BAD, _ODD = "#2a9d5c", "#c8372d", "#8a3ffc"
 """Of what is drawn as pixels."""
@@ -89,7 +90,7 @@ def _over(table: Table, column: Column, label: str, checks: Sequence[str]) -> st
                 ax.set_xticks(np.unique(places), [f"{place:g}" for place in np.unique(places)])
         _rates(axes[0], places, verdicts == "pass")
         for ax, name in zip(axes[1:], checks, strict=False):
-            values = _numbers(table[f"check.{name}"])
+            values = _measures(table, name)
             raster = len(values) > _MANY
             for verdict, colours in _COLOURS.items():
                 x, y = places[verdicts == verdict], values[verdicts == verdict]
@@ -151,7 +152,7 @@ def _histograms(table: Table, checks: Sequence[str]) -> str:
     verdicts = np.array(table["verdict"])
     with _axes(min(len(checks), 2), len(checks)) as (drawn, axes):
         for ax, name in zip(axes, checks, strict=False):
-            values = _numbers(table[f"check.{name}"])
+            values = _measures(table, name)
             there = ~np.isnan(values)
             edges = np.histogram_bin_edges(values[there], bins=min(30, max(5, int(there.sum() ** 0.5) * 2)))
             parts = [values[there & (verdicts == verdict)] for verdict in _COLOURS]
@@ -165,18 +166,22 @@ def _histograms(table: Table, checks: Sequence[str]) -> str:
 def _measured(ax: Axes, table: Table, name: str, line: Any) -> None:
     """Draw the limit of a check, if that is near enough to what was measured."""
     limit = table.checks[name]["limit"]
-    values = _numbers(table[f"check.{name}"])
+    values = _measures(table, name)
     if isinstance(limit, bool) or limit is None or not np.isfinite(values).any():
         return
+    limit, _ = in_degrees(limit, table.checks[name]["unit"])
     reach = max(np.nanmax(np.abs(values)), 1e-12)
     if abs(limit) <= 4.0 * reach:
         line(limit, color=ROLES["muted"], linestyle="--", linewidth=1.0)
 
 
 def _title(table: Table, name: str) -> str:
-    unit = table.checks[name]["unit"]
+    _, unit = in_degrees(0.0, table.checks[name]["unit"])
     return f"{name} [{unit}]" if unit else name
 
 
-def _numbers(values: Sequence[Any]) -> np.ndarray[Any, Any]:
-    return np.array([np.nan if value is None else float(value) for value in values])
+def _measures(table: Table, name: str) -> np.ndarray[Any, Any]:
+    """Return what a check measured in each run, in the unit of its title; NaN: nothing."""
+    scale, _ = in_degrees(1.0, table.checks[name]["unit"])
+    values = (np.nan if value is None else float(value) for value in table[f"check.{name}"])
+    return scale * np.fromiter(values, dtype=float)

@@ -12,6 +12,7 @@ from typing import Any
 from twin.experiments.sweep.judging import Outcome
 from twin.experiments.sweep.plan import Plan, PlannedRun
 from twin.experiments.sweep.result import SweepResult
+from twin.experiments.sweep.table import by_name
 from twin.plain_text import escaped
 from twin.scenario.command import twin_run
 
@@ -114,9 +115,9 @@ def command(plan: Plan, run: PlannedRun) -> str:
 def _medians(verdicts: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     values: dict[str, list[float]] = {}
     for verdict in verdicts:
-        for check in verdict["checks"]:
+        for name, check in by_name(verdict["checks"]).items():
             if check["value"] is not None and not isinstance(check["value"], bool):
-                values.setdefault(check["name"], []).append(check["value"])
+                values.setdefault(name, []).append(check["value"])
     return {name: statistics.median(found) for name, found in values.items()}
 
 
@@ -125,5 +126,5 @@ def _failures(verdicts: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     for verdict in verdicts:
         if verdict["error"] is not None:
             found[str(verdict["error"]).partition("\n")[0]] += 1
-        found.update(check["name"] for check in verdict["checks"] if not check["passed"])
+        found.update(name for name, check in by_name(verdict["checks"]).items() if not check["passed"])
     return dict(found.most_common())

@@ -11,6 +11,7 @@ from typing import Any
 from twin.experiments.sweep.axes import number
 from twin.experiments.sweep.plan import Plan, PlannedRun
 from twin.files.writing import replaced
+from twin.scenario.quantities import quantity
 
 COSTS = ("wall_time_s", "cpu_time_s", "real_time_factor", "pace_losses", "pace_lost_s")
 """Metrics that differ from one run to its repetition."""
@@ -42,6 +43,11 @@ class Table:
     def __getitem__(self, name: str) -> list[Any]:
         return self.columns[name].values
 
+    def shown(self, name: str, value: float | None) -> str:
+        """Return a value of a check as people read it."""
+        check = self.checks[name]
+        return quantity(value, check["unit"], check["limit"])
+
 
 def make_table(plan: Plan, runs: Sequence[tuple[PlannedRun, Mapping[str, Any]]]) -> Table:
     """Return the table of runs and their verdicts, a row each in the order given."""
@@ -52,7 +58,7 @@ def make_table(plan: Plan, runs: Sequence[tuple[PlannedRun, Mapping[str, Any]]])
     columns["seed"] = Column([run.seed for run, _ in runs])
     columns["verdict"] = Column([verdict["verdict"] for _, verdict in runs])
     columns["error"] = Column([verdict["error"] for _, verdict in runs])
-    named = [_by_name(verdict["checks"]) for _, verdict in runs]
+    named = [by_name(verdict["checks"]) for _, verdict in runs]
     for checks in named:
         table.checks.update({name: check for name, check in checks.items() if name not in table.checks})
     for name, one in table.checks.items():
@@ -83,7 +89,7 @@ def parameter(texts: Sequence[str]) -> Column:
     return Column([found[0] for found in numbers if found is not None], units.pop())
 
 
-def _by_name(checks: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+def by_name(checks: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Return checks by name; the second of a name is `NAME#2`."""
     seen: Counter[str] = Counter()
     named = {}

@@ -108,7 +108,7 @@ class TimeLimit(_MissionCheck):
         return super().decided if self._over_s is None else False
 
     def result(self) -> CheckResult:
-        """Return the outcome so far; the value is when the mission was done, or how long it took in vain."""
+        """Return the outcome so far; the value is when the mission was done, or the run ended."""
         last, time_s, reason = self._last, self._at_s, ""
         if last is None:
             reason = "the run made no step"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Collection
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from twin.errors import ScenarioError
 from twin.scenario.checks.check import NOTHING, BaseMotion, Check, CheckResult, RobotCheckConfig
 from twin.scenario.observation import CheckContext, Observation
+from twin.scenario.quantities import in_degrees
 from twin.scenario.signals import Signal
 from twin.scenario.signals.reference import Reference
 from twin.scenario.signals.topics import TopicReader
@@ -51,12 +51,11 @@ class SignalCheck(Check):
     def sentence(self, predicate: Predicate, margin: Margin) -> str:
         """Return why it failed, by the predicate whose value it was."""
         value, unit = margin.value, self._unit(predicate)
-        if isinstance(value, float) and unit.startswith("rad"):
-            value, unit = (
-                round(math.degrees(value), 9) + 0.0,
-                unit.replace("rad", "deg", 1),
-            )  # as the table has it
-        said = f"{value:.4g} {unit}".rstrip() if isinstance(value, float) else repr(value)
+        if isinstance(value, float):
+            value, unit = in_degrees(value, unit)  # as the table has it
+            said = f"{round(value, 9) + 0.0:.4g} {unit}".rstrip()
+        else:
+            said = repr(value)
         return f"{predicate.signal} was {said} at {margin.at_ns / 1e9:.2f} s"
 
     def _unit(self, predicate: Predicate) -> str:
