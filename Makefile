@@ -17,11 +17,10 @@ run: $(VENV)/.ready  ## the environment, then the warehouse scenario to its verd
 	$(BIN)/twin run $(SCENARIO)
 
 test: $(VENV)/.ready  ## the whole test suite, fast tests first
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow and not bench and not long"
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "slow and not bench and not long"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not bench and not long"
 
 test-long: $(VENV)/.ready  ## what takes longest: installations, every live value, many runs
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "long"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "long" $$(grep -rl --include='*.py' 'pytest.mark.long' tests)
 
 check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/ruff format --check .

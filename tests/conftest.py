@@ -32,3 +32,8 @@ settings.load_profile("twin")
 def endpoint() -> str:
     """Where nobody listens yet."""
     return free_endpoint()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run whole scenarios last."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is not None)

@@ -45,8 +45,6 @@ SLOW = {
     "docs/getting-started.md",
     "docs/navigation.md",
     "docs/arenas.md",
-    "docs/navigation/faults.md",
-    "docs/navigation/mapping.md",
     "docs/ros/commands.md",
 }
 """Pages whose commands take longer than some seconds."""
@@ -55,6 +53,9 @@ NOT_RUN = {
     r"make (?P<target>\w+)": "sets up an environment of its own: only its recipe is looked at",
     r"pip install twin-\*\.whl": "tests/test_wheel.py does that",
     r"cd my_robot && (twin test .*|python -m pytest)": "tests/test_wheel.py does that, with the wheel",
+    r"twin test scenarios -j 2 --out runs/all": "tests/runtime/test_shipped_scenarios.py does that",
+    r"twin report runs/all": "tests/runtime/test_shipped_scenarios.py does that",
+    r"twin run scenarios/warehouse_(lidar_lost|kidnapped|slam)\.yaml .*": "so do all that ship, there",
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
@@ -149,7 +150,6 @@ class Reader:
             )
 
 
-@pytest.mark.timeout(900)  # `twin test scenarios` runs them all, one after the other
 @pytest.mark.parametrize(
     "page", [pytest.param(page, marks=[pytest.mark.slow] if page in SLOW else []) for page in sorted(PAGES)]
 )

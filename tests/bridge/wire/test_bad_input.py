@@ -74,7 +74,7 @@ def test_a_flood_is_bounded_counted_and_reported_once(
     node.create_subscription(String, "quiet", lambda m: got.append(m.data))
     with raw_session(endpoint) as peer:
         matched(peer, CHATTER.replace("chatter", "quiet")).put(string("quiet"), attachment=attachment(1))
-        publisher = peer.declare_publisher(CHATTER, congestion_control=zenoh.CongestionControl.BLOCK)
+        publisher = matched(peer, CHATTER)
         for number in range(100_000):
             publisher.put(string(f"{number}"), attachment=attachment(number + 1))
         wait_for(lambda: bus.refused["overflow"] == 90_001)

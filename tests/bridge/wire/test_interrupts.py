@@ -100,6 +100,10 @@ def test_a_process_that_looks_for_somebody() -> None:
         assert _interrupt(process, 0.3) == (130, "")
 
 
+_RUN = "from twin.cli import main; print('begins', flush=True); main()"
+"""Before it begins, the interpreter itself would end with a traceback."""
+
+
 @pytest.mark.slow
 def test_a_run_that_others_may_join(tmp_path: Path) -> None:
     """From its imports to its middle; a verdict is there whole or not at all."""
@@ -107,13 +111,15 @@ def test_a_run_that_others_may_join(tmp_path: Path) -> None:
         out = tmp_path / str(number)
         command = ["run", "scenarios/diff_bot_figure8.yaml", "--pace", "4", "--listen", free_endpoint()]
         with subprocess.Popen(
-            [sys.executable, "-m", "twin.cli", *command, "--no-record", "--out", str(out)],
+            [sys.executable, "-c", _RUN, *command, "--no-record", "--out", str(out)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             cwd=ROOT,
         ) as process:
-            code, errors = _interrupt(process, 0.4 + number * 0.25)
+            assert process.stdout is not None
+            assert process.stdout.readline() == "begins\n"
+            code, errors = _interrupt(process, 0.1 + number * 0.25)
         assert (code, "Traceback" in errors, "Error" in errors) == (130, False, False), (number, errors)
         left = sorted(file.name for file in out.iterdir()) if out.exists() else []
         whole = ["junit.xml", "verdict.json"]

@@ -130,7 +130,7 @@ def test_a_request_is_read_from_standard_input(endpoint: str) -> None:
         ),
         (("/add_two_ints", "std_srvs/msg/Empty"), "is no service"),
         (("/add_two_ints", "std_srvs/srv/Emty"), "did you mean 'std_srvs/srv/Empty'?"),
-        (("/never_answers", "std_srvs/srv/Empty", "--timeout", "2"), "did not answer in 2 s"),
+        (("/never_answers", "std_srvs/srv/Empty", "--timeout", "0.5"), "did not answer in 0.5 s"),
     ],
 )
 def test_what_cannot_be_called_is_said_in_a_sentence(
@@ -144,7 +144,7 @@ def test_what_cannot_be_called_is_said_in_a_sentence(
 
 
 def test_waiting_for_a_service_ends_with_the_time_out(twin_here: Twin) -> None:
-    done = twin_here("service", "call", "/add_two", "std_srvs/srv/Empty", "--timeout", "2")
+    done = twin_here("service", "call", "/add_two", "std_srvs/srv/Empty", "--timeout", "0.5")
     assert done.stdout == "waiting for service to become available...\n"
     assert done.returncode == 2
     assert "\nerror: Unknown service '/add_two'; did you mean '/add_two_ints'?" in done.stderr
@@ -167,8 +167,8 @@ def test_a_rate_repeats_the_call_until_ctrl_c(endpoint: str) -> None:
 
 def test_a_wait_for_a_misspelt_name_says_so(twin_here: Twin) -> None:
     """It may come yet, so the command waits, as ros2's; but nobody should wait for a mistake unknowingly."""
-    called = twin_here("service", "call", "/add_two_int", ADD[1], "--timeout", "2")
+    called = twin_here("service", "call", "/add_two_int", ADD[1], "--timeout", "0.5")
     assert "WARNING: there is no service /add_two_int yet; did you mean /add_two_ints?\n" in called.stderr
-    sent = twin_here("action", "send_goal", "/fibonaci", "example_interfaces/action/Fibonacci", "-t", "2")
+    sent = twin_here("action", "send_goal", "/fibonaci", "example_interfaces/action/Fibonacci", "-t", "0.5")
     assert "WARNING: there is no action /fibonaci yet; did you mean /fibonacci?\n" in sent.stderr
     assert called.returncode == sent.returncode == 2

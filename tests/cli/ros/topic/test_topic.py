@@ -205,13 +205,13 @@ def test_a_definition_that_differs_is_refused(twin: Twin, tmp_path: Path) -> Non
 
 
 def test_publishers_that_promise_different_things(twin: Twin) -> None:
-    done = twin("topic", "echo", "/robot/mixed", "--timeout", "2")
+    done = twin("topic", "echo", "/robot/mixed", "--timeout", "0.5")
     assert (done.returncode, done.stdout) == (0, "")
     assert "Some, but not all, publishers are offering QoSReliabilityPolicy.RELIABLE. Falling" in done.stderr
 
 
 def test_echo_waits_for_a_topic(endpoint: str, twin: Twin) -> None:
-    done = twin("topic", "echo", "/chater", "--timeout", "2")
+    done = twin("topic", "echo", "/chater", "--timeout", "0.5")
     assert done.returncode == 2
     warning, error = done.stderr.splitlines()
     assert warning.startswith(
