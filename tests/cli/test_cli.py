@@ -630,10 +630,10 @@ def test_tests_are_listed_and_chosen(demo: Path, invoke: Invoke, monkeypatch: py
     assert err == "error: -m nightly: chooses none of 4 tests; tags: quick\n"
     monkeypatch.setattr("twin.experiments.suite.run.run_all", results("ppp"))
     assert invoke("test", ".", "-k", "not seed=3")[0] == 0
-    demo.write_text(SCENARIO + "test: {seeds: 0:3}\n", encoding="utf-8")
+    demo.write_text(SCENARIO + "test: {seeds: 0-3}\n", encoding="utf-8")
     code, out, err = invoke("test", ".", "--list")
     assert (code, out) == (2, "demo\n")
-    assert err.count("a range such as 1..10, not '0:3'") == err.count("not '0:3'") == 1
+    assert err.count("0:10 (without 10), not '0-3'") == err.count("not '0-3'") == 1
 
 
 def test_what_ended_before_a_ctrl_c_is_in_the_junit(
