@@ -358,7 +358,7 @@ def test_what_pub_refuses(twin: Twin, arguments: tuple[str, ...], sentence: str)
 def test_relay_passes_an_unknown_type_on(endpoint: str, twin: Twin) -> None:
     with started(endpoint, "topic", "relay", "/robot/gps", "/relayed") as process:
         assert lines(process, 1) == ["/robot/gps -> /relayed"]
-        done = twin("topic", "echo", "/relayed", "--once", "--raw", "--timeout", "10")
+        done = twin("topic", "echo", "/relayed", "--once", "--raw", "--timeout", "60")
         assert done.stdout.startswith("b'\\x00\\x01\\x00\\x00\\x04\\x00\\x00\\x00gps\\x00")
         assert "/relay\n" in twin("node", "list").stdout
 
