@@ -40,6 +40,12 @@ for _tag, _pattern in (
     _CoreLoader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(rf"(?:{_pattern})\Z"), None)
 
 
+class _FastLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """The same by libyaml, whose faults are told in fewer words."""
+
+    yaml_implicit_resolvers = _CoreLoader.yaml_implicit_resolvers
+
+
 @dataclass
 class Document:
     """Plain data of a file, where each value came from, and what is wrong with the YAML itself."""
@@ -123,11 +129,10 @@ def _construct(document: Document, node: yaml.Node, loc: Loc, above: tuple[int, 
 @lru_cache(maxsize=16)
 def _compose(text: str) -> yaml.Node | None:
     """Return the nodes of a text, which nobody changes: of two equal runs the second reads nothing."""
-    loader = _CoreLoader(text)
     try:
-        return loader.get_single_node()
-    finally:
-        loader.dispose()
+        return yaml.compose(text, _FastLoader)
+    except yaml.YAMLError:
+        return yaml.compose(text, _CoreLoader)
 
 
 def _yaml_message(fault: yaml.YAMLError) -> str:
