@@ -85,7 +85,7 @@ def draw_solids(
     for entity, frame, solids in shown:
         for i, solid in enumerate(solids):
             path = f"{entity}/mesh_{i}"
-            _declare_mesh(recording, path, rr.CoordinateFrame(frame), solid, own_colours=not see_through)
+            _declare_mesh(recording, path, frame, solid, own_colours=not see_through)
 
 
 def declare_floor(recording: rr.RecordingStream, low: Array, high: Array) -> None:
@@ -151,7 +151,7 @@ _ARCHETYPES: Mapping[type[Geometry], tuple[Any, _Fields]] = {
 def _declare_mesh(
     recording: rr.RecordingStream,
     path: str,
-    frame: rr.CoordinateFrame,
+    frame: str,
     solid: Solid,
     *,
     own_colours: bool,
@@ -176,7 +176,7 @@ def _declare_mesh(
         colours[known, :3] = np.round(255.0 * np.clip(triangles.face_colours[known], 0.0, 1.0))
     recording.log(
         path,
-        frame,
+        rr.CoordinateFrame(frame),
         rr.Mesh3D(
             vertex_positions=corners.reshape(-1, 3).astype(np.float32),
             vertex_normals=np.repeat(_normals(corners), 3, axis=0).astype(np.float32),
