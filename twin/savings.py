@@ -41,4 +41,6 @@ def uncollected() -> Iterator[None]:
         yield
     finally:
         if looks:
+            gc.freeze()
+            gc.unfreeze()  # all that is there is old now: the next look need not go through it
             gc.enable()
