@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 
 @dataclass(frozen=True, order=True)
@@ -25,6 +25,8 @@ class Clock:
 
     now_ns: int = 0
     """[ns] since the start of the run."""
+    is_simulated: ClassVar[bool] = True
+    """Whether others are told of it on `/clock`."""
 
     def now(self) -> Instant:
         """Return the present time; `clock.now().to_msg()` is a stamp."""

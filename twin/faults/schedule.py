@@ -85,7 +85,8 @@ class FaultSchedule:
                 ]
         if problems:
             raise ScenarioError(problems)
-        tells = any(watched.fault.text for watched in self._watched)
+        # Robots that pass for hardware do not know what is wrong with them.
+        tells = context.bus.clock.is_simulated and any(watched.fault.text for watched in self._watched)
         self._logger = context.bus.create_node("faults").get_logger() if tells else None
         self.robots = frozenset[str]().union(*(watched.fault.robots for watched in self._watched))
         """Robots that run in the process of the physics."""

@@ -61,7 +61,7 @@ class SensorPublisher:
         spec, reading = self.sensor.spec, self.sensor.sample(time_ns)
         if reading is None:
             return None
-        message = self._to_message(spec, Header(stamp(time_ns), spec.link), reading)
+        message = self._to_message(spec, Header(stamp(self.node.now_ns), spec.link), reading)
         for passed in self.filters:
             if message is not None:
                 message = passed(message, time_ns)

@@ -96,7 +96,7 @@ SquareMetres = Annotated[
 ]
 SquareRadians = Annotated[float, Unit("squared angle", (("rad²", "1"), ("rad^2", "1")))]
 Amperes = Annotated[float, Unit("current", (("A", "1"), ("mA", "1/1000")))]
-Share = Annotated[float, Unit("share", (("1", "1"), ("%", "1/100")))]
+Share = Annotated[float, Unit("share", (("1", "1"), ("%", "1/100"), ("ppm", "1/1000000")))]
 
 
 def unit_of(annotation: Any) -> Unit:

@@ -88,6 +88,8 @@ def build(
     crash_folder: Path | None = None,
     savings: Savings = ALL,
     before_nodes: Callable[[World, Bus], None] | None = None,
+    clock: Clock | None = None,
+    bare: bool = False,
 ) -> Parts:
     """Build the world, the bus and all nodes.
 
@@ -99,6 +101,8 @@ def build(
         crash_folder: Where the last states go if the physics diverges.
         savings: What is not done over again.
         before_nodes: Called when the world is there, and the bus without a node.
+        clock: What nodes take for the time; None: simulated time.
+        bare: Whether robots have the nodes of their hardware only, and no mission.
 
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
@@ -137,7 +141,7 @@ def build(
         crash_folder=crash_folder,
         savings=savings,
     )
-    clock = Clock()
+    clock = clock or Clock()
     name = outside.session if network.networked else "twin"
     bus = Bus.of(replace(network, name=name), clock, savings=savings)
     bus.starting()
@@ -162,12 +166,13 @@ def build(
                     spawn_height=heights[robot.id],
                     track_ratio=ratios[robot.id],
                     namespace="" if alone else f"/{robot.id}",
+                    is_bare=bare,
                 )
             )
             for robot in scenario.robots
         }
         robots_nodes = len(bus.nodes)
-        mission = build_missions(scenario.tasks, stacks, arena)
+        mission = build_missions(() if bare else scenario.tasks, stacks, arena)
         deciders = bus.nodes[robots_nodes:]
         bus.node_options, bus.group = None, ""
         for place in outside.nodes:

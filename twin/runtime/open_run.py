@@ -34,6 +34,7 @@ from twin.scenario.verdict import Verdict
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
+    from twin.bridge.clock import Clock
     from twin.recording.sink import RerunSink
     from twin.sim.world import World
 
@@ -81,6 +82,8 @@ class OpenRun:
         taps: Sequence[Callable[[Sample[Any]], None]] = (),
         before_nodes: Callable[[World, Bus], None] | None = None,
         viewer: str | None = None,
+        clock: Clock | None = None,
+        bare: bool = False,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -103,6 +106,8 @@ class OpenRun:
             taps: Called with every sample that a node publishes, from the first one on.
             before_nodes: Called when the world is there, and the bus without a node.
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
+            clock: What nodes take for the time; None: simulated time.
+            bare: Whether robots have the nodes of their hardware only, and no mission.
 
         Raises:
             TwinError: The run cannot be made.
@@ -137,6 +142,8 @@ class OpenRun:
                 crash_folder=out,
                 savings=savings,
                 before_nodes=before_nodes,
+                clock=clock,
+                bare=bare,
             )
             ending.callback(parts.bus.close)
             if bag_tap is not None:

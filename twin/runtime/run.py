@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import stamp
@@ -15,6 +15,7 @@ from twin.scenario.outside import ALONE, Outside
 from twin.scenario.schema import Scenario
 
 if TYPE_CHECKING:
+    from twin.bridge.topics import Publisher
     from twin.faults.schedule import FaultSchedule
     from twin.recording.sink import RerunSink
     from twin.runtime.outside import Lockstep
@@ -39,7 +40,9 @@ class Run:
         self.scenario = scenario
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
-        self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
+        self._clock_publisher: Publisher[Any] | None = None
+        if parts.clock.is_simulated:
+            self._clock_publisher = self.bus.create_node("clock").create_publisher(ClockMsg, "/clock", 1)
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
         goods = [good.name for good in self.world.scene.goods]
         needs = {field for check in self.checks for field in check.needs}
@@ -168,7 +171,8 @@ class Run:
 
     def clock(self) -> None:
         """6. `/clock`."""
-        self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)), frozen=True)
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(ClockMsg(clock=stamp(self.world.time_ns)), frozen=True)
 
     def _check(self) -> None:
         if self.workers is not None:

@@ -136,7 +136,7 @@ def load(
         PluginError: A plugin that was executed is wrong.
     """
     with uncollected():
-        return _checked(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
+        return of_document(read(catalogue.resolve(name_or_path), ScenarioError), overrides, execute)
 
 
 def load_again(
@@ -144,10 +144,13 @@ def load_again(
 ) -> Scenario:
     """Return the scenario of what was read earlier; see `load`."""
     document = Document(source.file, deepcopy(source.data))
-    return _checked(document, overrides, execute)
+    return of_document(document, overrides, execute)
 
 
-def _checked(document: Document, overrides: Mapping[str, str], execute: bool) -> Scenario:
+def of_document(
+    document: Document, overrides: Mapping[str, str] = MappingProxyType({}), execute: bool = False
+) -> Scenario:
+    """Return the scenario of what was read; see `load`."""
     context = {"execute": execute}
     scenario = checked(document, Scenario, error=ScenarioError, overrides=overrides, context=context)
     scenario._source = Source(document.file.absolute(), document.data, document)

@@ -18,7 +18,7 @@ from twin.errors import TwinError
 from twin.parameters.texts import texts_of
 from twin.strict_yaml.document import Document as Document
 from twin.strict_yaml.document import Loc as Loc
-from twin.strict_yaml.document import apply_override
+from twin.strict_yaml.document import apply_override as apply_override
 from twin.strict_yaml.document import read as read
 from twin.strict_yaml.explain import Fault as Fault
 from twin.strict_yaml.explain import Faults as Faults

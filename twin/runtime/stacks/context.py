@@ -29,3 +29,5 @@ class StackContext:
     """Effective over geometric track of a skid steer, as calibrated."""
     namespace: str
     """'' for a single robot, '/name' among several."""
+    is_bare: bool = False
+    """Whether it has only the nodes of its hardware: drive, joints, sensors, description."""

@@ -23,6 +23,7 @@ from twin.runtime.stacks.localisation import build_localisation
 if TYPE_CHECKING:
     from twin.nodes.navigation.bt_navigator import BtNavigatorNode
     from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig
+    from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 
 
 class RobotStack:
@@ -60,24 +61,9 @@ class RobotStack:
         self.manipulator = derive.manipulator(description)
         self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
         self.navigator: BtNavigatorNode | None = None
-        self.slam = build_localisation(context, self.robot_pose)
-        if context.config.navigation is not None:
-            from twin.runtime.stacks.navigation import build_navigation
-
-            self.navigator = build_navigation(
-                context, context.config.navigation, self.robot_pose, self.footprint
-            )
-        elif drive is not None:
-            from twin.nodes.navigation.behavior_server import BehaviorServerNode
-
-            BehaviorServerNode(
-                bus,
-                self.robot_pose,
-                BehaviorConfig(),
-                cmd_vel="cmd_vel",
-                period_ns=context.control_period_ns,
-                namespace=namespace,
-            )
+        self.slam: SlamToolboxNode | None = None
+        if not context.is_bare:
+            self._build_autonomy()
         self._build_arm(description)
         if fused is not None:
             warn_of_unpublished_sources(context, fused)
@@ -114,6 +100,25 @@ class RobotStack:
             )
         return node
 
+    def _build_autonomy(self) -> None:
+        context, pose = self.context, self.robot_pose
+        self.slam = build_localisation(context, pose)
+        if context.config.navigation is not None:
+            from twin.runtime.stacks.navigation import build_navigation
+
+            self.navigator = build_navigation(context, context.config.navigation, pose, self.footprint)
+        elif self.drive is not None:
+            from twin.nodes.navigation.behavior_server import BehaviorServerNode
+
+            BehaviorServerNode(
+                context.bus,
+                pose,
+                BehaviorConfig(),
+                cmd_vel="cmd_vel",
+                period_ns=context.control_period_ns,
+                namespace=context.namespace,
+            )
+
     def _build_arm(self, description: RobotDescription) -> None:
         bus, namespace, hardware = self.context.bus, self.context.namespace, self.handle.hardware
         if self.manipulator is None:
@@ -124,7 +129,6 @@ class RobotStack:
             return
         from twin.nodes.gripper_controller import GripperControllerNode
         from twin.nodes.joint_trajectory_controller import JointTrajectoryControllerNode
-        from twin.nodes.tote_detector import ToteDetectorNode
 
         JointTrajectoryControllerNode(bus, hardware, self.manipulator.arm_joints, namespace=namespace)
         GripperControllerNode(
@@ -134,5 +138,9 @@ class RobotStack:
             period_ns=self.context.control_period_ns,
             namespace=namespace,
         )
+        if self.context.is_bare:
+            return
+        from twin.nodes.tote_detector import ToteDetectorNode
+
         detector = None if self.context.config.detector is None else self.context.config.detector.build()
         ToteDetectorNode(bus, self.robot_pose, detector, namespace=namespace)

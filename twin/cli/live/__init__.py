@@ -1,0 +1,1 @@
+"""Commands of robots that live by the clock on the wall."""
