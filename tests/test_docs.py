@@ -125,7 +125,7 @@ class Reader:
 
     def finish(self) -> None:
         for process, output in self.background:
-            if "examples/" in str(process.args):  # runs until it is stopped
+            if re.search(r"examples/|twin plant", str(process.args)):  # runs until it is stopped
                 process.send_signal(signal.SIGINT)
             self._judge("--listen", process, output)
 

@@ -42,6 +42,7 @@ WALL_CLOCK = {
     "twin/experiments/sweep/ray_cluster.py": {"monotonic"},  # the time limit of a run
     "twin/runtime/workers/process.py": {"monotonic", "sleep"},  # waits for the end of a process
     "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
+    "twin/live/plant.py": {"time_ns"},  # a physical robot's clock starts at the time of day
     "twin/recording/sink.py": {"monotonic_ns"},  # how much of its end a killed run may lose
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import csv
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from twin.bridge import live
 from twin.bridge.graph import Graph
 from twin.bridge.msgs import LaserScan, Odometry, Twist, new, ns
 from twin.bridge.wire.session import SessionConfig
@@ -105,3 +110,21 @@ def test_every_wrong_perturbation_is_told_at_once() -> None:
         "override clock_drift=3: clock_drift: must be less than 0.1, not 3",
         "override track=-1: faults.0.track: must be greater than 0.0, not -1",
     ]
+
+
+def test_a_program_of_its_own_that_ends_with_ctrl_c(endpoint: str, tmp_path: Path) -> None:
+    truth = tmp_path / "new" / "truth.csv"
+    words = ["plant", "diff_bot_figure8", "--listen", endpoint, "--truth", str(truth)]
+    command = [sys.executable, "-m", "twin.cli", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == f"diff_bot at {endpoint}; Ctrl-C ends it\n"
+        with live.join((endpoint,)) as here:
+            heard: list[Any] = []
+            here.bus.create_node("listener").create_subscription(Odometry, "/odom", heard.append, 10)
+            assert here.spin(lambda: len(heard) >= 3, timeout_s=100.0)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(100) == 0
+    stamps = {row["stamp_ns"] for row in csv.DictReader(truth.read_text().splitlines())}
+    assert {str(ns(message.header.stamp)) for message in heard} <= stamps
+    assert abs(ns(heard[-1].header.stamp) - time.time_ns()) < 600e9, "it tells the time of day"

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from twin.files.writing import check_file, make_folder
 from twin.live.device_clock import RIGHT, ClockError, DeviceClock
 from twin.runtime.open_run import OpenRun
 from twin.scenario.missions import Idle
@@ -57,6 +58,8 @@ class Plant:
         with ExitStack() as ending:
             self._rows: Any = None
             if truth is not None:
+                check_file(truth, "--truth")
+                make_folder(truth.absolute().parent)
                 file = ending.enter_context(truth.open("w", newline="", encoding="utf-8"))
                 self._rows = csv.writer(file)
                 self._rows.writerow(TRUTH_COLUMNS)

@@ -8,19 +8,12 @@ from typing import Annotated
 import typer
 
 from twin.bridge.wire import DEFAULT_ENDPOINT
-from twin.cli import completion
-from twin.cli.option_groups import Overrides, Seed
+from twin.cli.option_groups import Overrides, Seed, scenario_argument
 
 
 def plant(
     scenario: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A scenario of `twin scenarios`, or a file.",
-            show_default=False,
-            autocompletion=completion.scenarios,
-        ),
+        Path, scenario_argument(metavar="SCENARIO", help="A scenario of `twin scenarios`, or a file.")
     ],
     perturb: Annotated[
         str,
@@ -53,9 +46,9 @@ def plant(
         typer.Option(metavar="FILE", help="Write where the robots really are, as CSV; for tests only."),
     ] = None,
 ) -> None:
-    """Run a scenario's robots in real time as if they were hardware, until Ctrl-C.
+    """Run a scenario's robots in real time as if they were hardware.
 
-    They have ROS 2 topics only, and a clock of their own.
+    They have ROS 2 topics, services and actions of drivers, and a clock of their own. Ctrl-C ends it.
     """
     from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.wire.interrupts import noted_signals
