@@ -77,7 +77,7 @@ def test_what_is_wrong_with_the_tests_of_a_file_is_an_error_of_collection(projec
     done = pytest_in(project, "scenarios/spin.yaml")
     assert done.returncode == 2
     assert (
-        "scenarios/spin.yaml:7: test.seeds: must be a list of seeds or a range such as 1..10" in done.stdout
+        "scenarios/spin.yaml:7: test.seeds: must be a list of seeds, 1,5,9, or a range such as 1..10" in done.stdout
     )
     assert "Traceback" not in done.stdout
 
