@@ -27,7 +27,7 @@ LIMITS = VelocitySmootherConfig(
 
 
 def configured(**keys: object) -> object:
-    server = controller_server_config(ControllerParameters.model_validate(keys), LIMITS)
+    server = controller_server_config(ControllerParameters.whole().model_validate(keys), LIMITS)
     return server.controllers["FollowPath"]
 
 
@@ -77,7 +77,7 @@ def test_overrides_reach_plugin_critic_and_shim() -> None:
 )
 def test_a_key_of_another_plugin_is_refused(keys: dict[str, object], told: str) -> None:
     with pytest.raises(ValidationError, match=told):
-        ControllerParameters.model_validate(keys)
+        ControllerParameters.whole().model_validate(keys)
 
 
 def test_an_unknown_key_is_told_with_the_few_that_it_may_mean(tmp_path: Path) -> None:
@@ -95,9 +95,9 @@ def test_an_unknown_key_is_told_with_the_few_that_it_may_mean(tmp_path: Path) ->
 
 
 def test_more_controllers_are_there_by_id_with_a_goal_checker_each() -> None:
-    precise = FurtherControllerParameters(plugin="mppi", xy_goal_tolerance=0.02)
+    precise = FurtherControllerParameters.whole()(plugin="mppi", xy_goal_tolerance=0.02)
     server = controller_server_config(
-        ControllerParameters(controller_frequency=20.0), LIMITS, {"Precise": precise}
+        ControllerParameters.whole()(controller_frequency=20.0), LIMITS, {"Precise": precise}
     )
     assert list(server.controllers) == ["FollowPath", "Precise"]
     shim = server.controllers["Precise"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from annotated_types import Ge, GroupedMetadata, Gt, Interval, Le, Lt
+from annotated_types import Ge, Gt, Interval, Le, Lt
 
 Positive = Gt(0)
 NotNegative = Ge(0)
@@ -31,7 +31,7 @@ class Bounds:
         low: Gt | Ge | None = None
         high: Lt | Le | None = None
         for one in metadata:
-            for part in one if isinstance(one, GroupedMetadata) else (one,):
+            for part in one if isinstance(one, Interval) else (one,):
                 if isinstance(part, Gt | Ge):
                     low = part
                 elif isinstance(part, Lt | Le):

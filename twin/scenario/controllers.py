@@ -7,6 +7,7 @@ plugin does not have is refused.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from functools import cache
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
@@ -36,7 +37,7 @@ ControllerId = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$"), AfterVa
 """As in Nav2's controller_plugins."""
 
 
-@keys_of(StoppedGoalCheckerConfig)
+@keys_of(StoppedGoalCheckerConfig, later=True)
 class GoalCheckerParameters(ParameterGroup):
     """Which goal checker, and its parameters."""
 
@@ -45,7 +46,7 @@ class GoalCheckerParameters(ParameterGroup):
     plugin of yours, or `{plugin: ...}` with its parameters; absent: `simple`."""
 
 
-@keys_of(PoseProgressCheckerConfig)
+@keys_of(PoseProgressCheckerConfig, later=True)
 class ProgressCheckerParameters(ParameterGroup):
     """Which progress checker, and its parameters."""
 
@@ -54,7 +55,7 @@ class ProgressCheckerParameters(ParameterGroup):
     with its parameters; absent: `simple`."""
 
 
-@keys_of(ControllerServerConfig)
+@keys_of(ControllerServerConfig, later=True)
 class ServerParameters(ProgressCheckerParameters):
     """Parameters of the server: they hold for all controllers."""
 
@@ -80,24 +81,21 @@ def _critic_names(controller: type, critic: type) -> list[str]:
     return [one.name for one in inside if one.config is not None and issubclass(one.config, critic)]
 
 
-_OF_PLUGIN = {name: key_names(config) for name, config in configs_of(CONTROLLERS).items()}
-_OF_SHIM = _OF_PLUGIN.pop("rotation_shim")
-_CRITICS = {
-    "mppi": _critic_names(MPPIConfig, CriticConfig),
-    "dwb": _critic_names(DWBConfig, ScaleConfig),
-}
-"""Those that are compiled into a controller, by its name."""
+@cache
+def _of_plugins() -> dict[str, tuple[str, ...]]:
+    """Return the keys of what ships, by its name."""
+    return {name: key_names(config) for name, config in configs_of(CONTROLLERS).items()}
 
 
 def _valid_with(name: str) -> str:
     """Return what a key needs beside it."""
-    owners = [f"`plugin: {plugin}`" for plugin, names in _OF_PLUGIN.items() if name in names]
-    if name in _OF_SHIM:
-        owners.append("`rotation_shim: true`")
-    return " or ".join(owners)
+    plugins = [plugin for plugin, names in _of_plugins().items() if name in names]
+    return " or ".join(
+        f"`{'rotation_shim: true' if p == 'rotation_shim' else f'plugin: {p}'}`" for p in plugins
+    )
 
 
-@keys_of(*configs_of(CONTROLLERS).values())
+@keys_of(*configs_of(CONTROLLERS).values(), later=True)
 class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, ServerParameters):
     """Parameters of `/controller_server`, of its checkers, and of the plugin that follows paths."""
 
@@ -106,14 +104,15 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
     @classmethod
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys of the server, the checkers, and the rotation shim if it is asked for."""
-        shim = _OF_SHIM if data.get("rotation_shim") is True else ()
-        return {*ServerParameters.model_fields, *PluginParameters.model_fields, *shim}
+        shim = _of_plugins()["rotation_shim"] if data.get("rotation_shim") is True else ()
+        return {*ServerParameters.whole().model_fields, *PluginParameters.whole().model_fields, *shim}
 
     @classmethod
     def ships(cls, data: Mapping[str, Any]) -> Collection[str] | None:
         """Return the names of the critics that ship for the plugin; None: it has no list of them."""
         plugin = data.get("plugin")
-        return _CRITICS.get(plugin) if isinstance(plugin, str) else None
+        critics = {"mppi": (MPPIConfig, CriticConfig), "dwb": (DWBConfig, ScaleConfig)}
+        return _critic_names(*critics[plugin]) if plugin in critics else None
 
     @property
     def chosen(self) -> str:
@@ -130,8 +129,9 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
         if self.chosen == "rotation_shim":
             yield Fault(("plugin",), "the rotation shim stands before a plugin: write 'rotation_shim: true'")
             return
-        valid = {*ServerParameters.model_fields, *PluginParameters.model_fields}
-        valid.update(_OF_PLUGIN[self.chosen] if self.users is None else (), _OF_SHIM if self.shim else ())
+        valid = {*ServerParameters.whole().model_fields, *PluginParameters.whole().model_fields}
+        used = [self.chosen] * (self.users is None) + ["rotation_shim"] * self.shim
+        valid.update(*(_of_plugins()[plugin] for plugin in used))
         for name in type(self).model_fields:
             if name in self.model_fields_set and name not in valid:
                 told = f"{self.chosen} {'with' if self.shim else 'without'} rotation shim"
@@ -150,10 +150,11 @@ class ControllerParameters(PluginGroup, PluginListGroup, PluginParameters, Serve
                     yield Fault((name,), f"'{name}' needs {needed} beside it")
 
 
+@keys_of(later=True)
 class FurtherControllerParameters(ControllerParameters):
     """Parameters of a controller beside FollowPath, and of a goal checker of the same name."""
 
     @faultless
     def _of_the_server(self) -> Iterator[Fault]:
-        for name in sorted(self.model_fields_set & set(ServerParameters.model_fields)):
+        for name in sorted(self.model_fields_set & set(ServerParameters.whole().model_fields)):
             yield Fault((name,), f"'{name}' holds for all controllers: give it under `controller`")

@@ -6,6 +6,7 @@ Every one is optional: `overrides()` holds only what the file gives, the rest ke
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
@@ -24,9 +25,10 @@ from twin.scenario.fields import NameOrPath
 from twin.scenario.parameter_group import ParameterGroup, key_names, keys_of
 from twin.scenario.plugin_groups import PluginGroup, PluginListGroup, plugin_name
 from twin.strict_yaml import StrictModel
+from twin.strict_yaml.later import Later
 
 
-@keys_of(PlannerServerConfig, CommitmentConfig, GoalAccessConfig)
+@keys_of(PlannerServerConfig, CommitmentConfig, GoalAccessConfig, later=True)
 class PlannerServerParameters(ParameterGroup):
     """What holds for every planner."""
 
@@ -35,10 +37,13 @@ class PlannerServerParameters(ParameterGroup):
     circle (`smac_hybrid`); or a plugin of yours, whose parameters stand beside it."""
 
 
-_KEYS = {plugin: key_names(config) for plugin, config in configs_of(PLANNERS).items()}
+@cache
+def _keys() -> dict[str, tuple[str, ...]]:
+    """Return the keys of the planners that ship, by name."""
+    return {plugin: key_names(config) for plugin, config in configs_of(PLANNERS).items()}
 
 
-@keys_of(*configs_of(PLANNERS).values())
+@keys_of(*configs_of(PLANNERS).values(), later=True)
 class PlannerParameters(PluginGroup, PlannerServerParameters):
     """Parameters of `/planner_server`: which planner `GridBased` is, and that planner's own."""
 
@@ -47,15 +52,15 @@ class PlannerParameters(PluginGroup, PlannerServerParameters):
     @classmethod
     def beside(cls, data: Mapping[str, Any]) -> set[str]:
         """Return the keys of the server."""
-        return set(PlannerServerParameters.model_fields)
+        return set(PlannerServerParameters.whole().model_fields)
 
     @classmethod
     def _descriptions(cls) -> Mapping[str, str]:
         """Return what is told of the keys, and which plugins have them."""
         told = dict(super()._descriptions())
         for name in told:
-            owners = [f"`{plugin}`" for plugin, own in _KEYS.items() if name in own]
-            if 0 < len(owners) < len(_KEYS):
+            owners = [f"`{plugin}`" for plugin, own in _keys().items() if name in own]
+            if 0 < len(owners) < len(_keys()):
                 told[name] = f"{' and '.join(owners)}: {told[name]}"
         return told
 
@@ -63,16 +68,16 @@ class PlannerParameters(PluginGroup, PlannerServerParameters):
     def _belongs_to_the_plugin(self) -> PlannerParameters:
         if self.users is not None:
             return self
-        valid = {*PlannerServerParameters.model_fields, *_KEYS[self.plugin]}
+        valid = {*PlannerServerParameters.whole().model_fields, *_keys()[self.plugin]}
         for name in sorted(self.model_fields_set - valid):
-            others = " or ".join(plugin for plugin, own in _KEYS.items() if name in own)
+            others = " or ".join(plugin for plugin, own in _keys().items() if name in own)
             raise ValueError(
                 f"{name} is a parameter of {others}; {self.plugin} has {', '.join(sorted(valid))}"
             )
         return self
 
 
-@keys_of(*configs_of(SMOOTHERS).values())
+@keys_of(*configs_of(SMOOTHERS).values(), later=True)
 class SmootherParameters(PluginGroup):
     """Parameters of `/smoother_server`: its first smoother, which also smooths what a planner has planned."""
 
@@ -86,7 +91,7 @@ class SmootherParameters(PluginGroup):
         return {"plugin"}
 
 
-@keys_of(CostmapNodeConfig)
+@keys_of(CostmapNodeConfig, later=True)
 class CostmapParameters(PluginListGroup):
     """Parameters of a costmap; those of a layer of yours stand beside `plugins`, by the name of its class."""
 
@@ -98,7 +103,7 @@ class CostmapParameters(PluginListGroup):
         return SHIPPED_LAYERS
 
 
-@keys_of(BtNavigatorConfig)
+@keys_of(BtNavigatorConfig, later=True)
 class NavigatorParameters(PluginListGroup):
     """Parameters of `/bt_navigator`."""
 
@@ -126,23 +131,39 @@ class NavigationConfig(StrictModel):
     """Stops or slows down every command that leads into what the sensors see; absent: with the defaults."""
     params_file: NameOrPath | None = None
     """A Nav2 parameter file; all other keys here go before its values."""
-    navigator: NavigatorParameters = NavigatorParameters.model_construct()
+    navigator: Annotated[NavigatorParameters, Later(NavigatorParameters.whole)] = (
+        NavigatorParameters.model_construct()
+    )
     """Overrides of the navigator."""
     keepout_mask: NameOrPath | None = None
     """Mask of the zones that no path may cross: a YAML file of map_server."""
     speed_mask: NameOrPath | None = None
     """Mask of speed limits, in per cent of the cruise speed: a YAML file of map_server."""
-    planner: PlannerParameters = PlannerParameters.model_construct()
+    planner: Annotated[PlannerParameters, Later(PlannerParameters.whole)] = (
+        PlannerParameters.model_construct()
+    )
     """Overrides of the global planner."""
-    smoother: SmootherParameters = SmootherParameters.model_construct()
+    smoother: Annotated[SmootherParameters, Later(SmootherParameters.whole)] = (
+        SmootherParameters.model_construct()
+    )
     """Overrides of the path smoother."""
-    controller: ControllerParameters = ControllerParameters.model_construct()
+    controller: Annotated[ControllerParameters, Later(ControllerParameters.whole)] = (
+        ControllerParameters.model_construct()
+    )
     """Overrides of the path follower."""
-    controllers: dict[ControllerId, FurtherControllerParameters] = Field(default_factory=dict)
+    controllers: dict[
+        ControllerId, Annotated[FurtherControllerParameters, Later(FurtherControllerParameters.whole)]
+    ] = Field(default_factory=dict)
     """More of them, for goals and behaviour trees that name a controller or a goal checker."""
-    global_costmap: CostmapParameters = CostmapParameters.model_construct()
+    global_costmap: Annotated[CostmapParameters, Later(CostmapParameters.whole)] = (
+        CostmapParameters.model_construct()
+    )
     """Overrides of the costmap that plans are made on."""
-    local_costmap: CostmapParameters = CostmapParameters.model_construct()
+    local_costmap: Annotated[CostmapParameters, Later(CostmapParameters.whole)] = (
+        CostmapParameters.model_construct()
+    )
     """Overrides of the rolling costmap around the robot."""
-    docking: DockingParameters = DockingParameters.model_construct()
+    docking: Annotated[DockingParameters, Later(DockingParameters.whole)] = (
+        DockingParameters.model_construct()
+    )
     """Docks, and overrides of the docking server."""

@@ -6,7 +6,7 @@ from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import create_model
 
@@ -27,7 +27,7 @@ class ParameterGroup(StrictModel):
     """Parameters of one node; a key that is absent keeps the node's default."""
 
     configs: ClassVar[tuple[type, ...]] = ()
-    """Whose fields are keys of this group."""
+    """Whose fields are keys of this group, beside those of its bases."""
     declared: ClassVar[Mapping[str, Declaration]] = MappingProxyType({})
     """What those keys are that it has of them, by name."""
 
@@ -38,9 +38,16 @@ class ParameterGroup(StrictModel):
         declared = ChainMap(*(dict(group.declared) for group in groups))
         return {name: one.text for name, one in declared.items()} | dict(super()._descriptions())
 
-    if TYPE_CHECKING:
+    @classmethod
+    def whole(cls) -> type[Self]:
+        """Return the group with its keys; see `keys_of`."""
+        return _whole(cls)
 
-        def __getattr__(self, name: str) -> Any: ...
+    def __getattr__(self, name: str) -> Any:
+        """Return None for a key of a group that no file has given: its keys were never made."""
+        if name[0] != "_" and any(name in key_names(config) for config in _configs(type(self))):
+            return None
+        return super().__getattr__(name)  # type: ignore[misc]
 
     def overrides(self) -> dict[str, Any]:
         """Return only the parameters that the file gives, by name; those of a group inside as a mapping."""
@@ -64,31 +71,43 @@ class ParameterGroup(StrictModel):
             raise ScenarioError(str(error)) from error
 
 
-def keys_of(*configs: type, whole: bool = False) -> Callable[[type[G]], type[G]]:
+def keys_of(*configs: type, whole: bool = False, later: bool = False) -> Callable[[type[G]], type[G]]:
     """Return a decorator that gives a group an optional key for every parameter of some configs.
 
     Args:
         configs: What the keys are of.
         whole: Whether the group is all that a config is made of: its defaults are that one's.
+        later: Whether the keys are made when a file has the group: where it is one, `Later(group.whole)`
+            stands beside it. The group itself is then one that is not given.
     """
 
     def decorate(group: type[G]) -> type[G]:
-        keys, declared = dict[str, Any](), dict[str, Declaration]()
-        for config in configs:
-            for declaration in _keyed(config):
-                key = _key(declaration, whole=whole)
-                if key is not None and declaration.name not in group.model_fields:
-                    keys[declaration.name] = key
-                    declared[declaration.name] = declaration
-        made = create_model(
-            group.__name__, __base__=group, __module__=group.__module__, __doc__=group.__doc__, **keys
-        )
-        made.__qualname__ = group.__qualname__
-        made.configs = (*group.configs, *configs)
-        made.declared = MappingProxyType(declared)
-        return made
+        group.configs = configs
+        return group if later else _whole(group, all_of_it=whole)
 
     return decorate
+
+
+@cache
+def _whole(group: type[G], *, all_of_it: bool = False) -> type[G]:
+    keys, declared = dict[str, Any](), dict[str, Declaration]()
+    for config in _configs(group):
+        for declaration in _keyed(config):
+            key = _key(declaration, whole=all_of_it)
+            if key is not None and declaration.name not in group.model_fields:
+                keys[declaration.name] = key
+                declared[declaration.name] = declaration
+    made = create_model(
+        group.__name__, __base__=group, __module__=group.__module__, __doc__=group.__doc__, **keys
+    )
+    made.__qualname__ = group.__qualname__
+    made.declared = MappingProxyType(declared)
+    return made
+
+
+def _configs(group: type[ParameterGroup]) -> Iterator[type]:
+    for base in reversed(group.__mro__):
+        yield from vars(base).get("configs", ())
 
 
 @cache

@@ -16,7 +16,7 @@ Model = type[BaseModel]
 
 def later(model: str | Callable[[], Model]) -> Any:
     """Return the type of a key whose model is `module:Class`, or what a function returns."""
-    return Annotated[Any, _Later(partial(found, model) if isinstance(model, str) else model)]
+    return Annotated[Any, Later(partial(found, model) if isinstance(model, str) else model)]
 
 
 def found(target: str) -> Model:
@@ -27,7 +27,9 @@ def found(target: str) -> Model:
 
 
 @dataclass(frozen=True, eq=False)
-class _Later:
+class Later:
+    """Beside a type: this model is what it is read with."""
+
     make: Callable[[], Model]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

@@ -472,7 +472,7 @@ def test_numbers_that_are_valid_only_together(tmp_path: Path) -> None:
 
 
 def test_what_a_scenario_gives_must_fit_together() -> None:
-    given = CostmapParameters.model_validate({"raytrace_min_range": 2.0})
+    given = CostmapParameters.whole().model_validate({"raytrace_min_range": 2.0})
     assert given.over(CostmapConfig()).raytrace_min_range == 2.0
     with pytest.raises(ScenarioError, match="raytrace_min_range is 2, more than raytrace_max_range, 1"):
         given.over(CostmapConfig(raytrace_max_range=1.0))
