@@ -47,6 +47,11 @@ MOST = {
 """Elements of a kind; the largest robots known have 200 links."""
 
 
+_MOST_KNOWN = 4
+_known: dict[tuple[bytes, Path, LineTable | None, str], RobotDescription] = {}
+"""Robots that were read, whose text alone says all: another run of one need not read it again."""
+
+
 def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDescription:
     """Return a robot as data.
 
@@ -59,10 +64,18 @@ def load(name_or_path: str | Path, options: ReadOptions = DEFAULTS) -> RobotDesc
     """
     source = resolve(name_or_path)
     raw = read_utf8(source)
+    urdf, lines = raw, None
     if _has_xacro(source, raw):
         expanded = expand(source, options)
-        return parse_urdf(expanded.urdf, source, options, lines=expanded.lines)
-    return parse_urdf(raw, source, options)
+        urdf, lines = expanded.urdf.encode(), expanded.lines
+    if b"mesh" in urdf or options.sensors:  # it is made of more than its text
+        return parse_urdf(urdf, source, options, lines=lines)
+    key = (urdf, source, lines, repr(options))
+    if key not in _known:
+        while len(_known) >= _MOST_KNOWN:
+            del _known[next(iter(_known))]
+        _known[key] = parse_urdf(urdf, source, options, lines=lines)
+    return _known[key]
 
 
 def parse_urdf(
