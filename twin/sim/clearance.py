@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 FARTHEST = 5.0
 """What is farther away is not looked for [m]."""
+_AT_ONCE = 16
+"""Shapes of the surroundings, nearest first."""
 
 
 class ClearanceMeter:
@@ -40,22 +42,33 @@ class ClearanceMeter:
         Negative where they overlap; `FARTHEST` if nothing is nearer.
         """
         own, others = self._pairs[robot]
-        least = self._at_least(own, others)
+        # A sphere around the whole robot leaves few of the hall's shapes to be looked at one by one.
+        centres, radii = self._data.geom_xpos[own], self._model.geom_rbound[own]
+        middle = centres.mean(axis=0)
+        reach = np.max(np.linalg.norm(centres - middle, axis=1) + radii)
+        around = self._at_least(middle[None], np.array([reach]), others)[0]
+        order = np.argsort(around, kind="stable")
         nearest = FARTHEST
-        for pair in np.argsort(least, axis=None, kind="stable"):
-            i, j = divmod(int(pair), len(others))
-            if least[i, j] >= nearest:
+        for begin in range(0, len(order), _AT_ONCE):
+            some = order[begin : begin + _AT_ONCE]
+            if around[some[0]] >= nearest:
                 break
-            distance = mujoco.mj_geomDistance(
-                self._model, self._data, int(own[i]), int(others[j]), nearest, None
-            )
-            nearest = min(nearest, distance)
+            least = self._at_least(centres, radii, others[some])
+            for pair in np.argsort(least, axis=None, kind="stable"):
+                i, j = divmod(int(pair), len(some))
+                if least[i, j] >= nearest:
+                    break
+                shapes = int(own[i]), int(others[some[j]])
+                distance = mujoco.mj_geomDistance(self._model, self._data, *shapes, nearest, None)
+                nearest = min(nearest, distance)
         return float(nearest)
 
-    def _at_least(self, own: NDArray[np.intp], others: NDArray[np.intp]) -> Array:
-        """Return lower bounds of the distances of pairs, shape (n, m) [m]: spheres around, boxes around."""
+    def _at_least(self, centres: Array, radii: Array, others: NDArray[np.intp]) -> Array:
+        """Return lower bounds of the distances of spheres, shapes (n, 3) and (n,), from the boxes of shapes.
+
+        Shape (n, m) [m].
+        """
         model, data = self._model, self._data
-        centres, radii = data.geom_xpos[own], model.geom_rbound[own]
         offsets = centres[:, None] - data.geom_xpos[others]
         local = np.einsum("nmi,mij->nmj", offsets, data.geom_xmat[others].reshape(-1, 3, 3))
         boxes = model.geom_aabb[others]
