@@ -1,1 +1,1 @@
-"""A physical robot beside its virtual one: what stands in for it, what follows it, how far they are apart."""
+"""Robots by the clock on the wall: one that stands in for a physical one."""
