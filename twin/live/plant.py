@@ -24,7 +24,7 @@ TRUTH_COLUMNS = ("robot", "stamp_ns", "x", "y", "yaw")
 
 
 class Plant:
-    """A scenario's robots as their hardware: nodes of drivers, no `/clock`, nothing that tells of a simulation."""
+    """A scenario's robots as their hardware: drivers' nodes, no `/clock`, nothing of a simulation."""
 
     def __init__(
         self,
