@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from twin.files.writing import check_file, make_folder
 from twin.live.device_clock import RIGHT, ClockError, DeviceClock
 from twin.runtime.open_run import OpenRun
+from twin.runtime.stacks.context import Layout
 from twin.scenario.missions import Idle
 from twin.scenario.schema import Scenario
 
@@ -64,7 +65,12 @@ class Plant:
                 self._rows = csv.writer(file)
                 self._rows.writerow(TRUTH_COLUMNS)
             self.run = OpenRun(
-                scenario, record=False, network=network, pace=pace, clock=self.clock, bare=not autonomy
+                scenario,
+                record=False,
+                network=network,
+                pace=pace,
+                clock=self.clock,
+                layout=Layout(autonomy="all" if autonomy else "none"),
             )
             ending.callback(self.run.close)
             self._ending = ending.pop_all()

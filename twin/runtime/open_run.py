@@ -24,6 +24,7 @@ from twin.runtime.defaults import from_description as derive
 from twin.runtime.kept_run import KeptRun
 from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
+from twin.runtime.stacks.context import WHOLE, Layout
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.threads import end_threads
 from twin.savings import ALL, Savings, uncollected
@@ -83,7 +84,7 @@ class OpenRun:
         before_nodes: Callable[[World, Bus], None] | None = None,
         viewer: str | None = None,
         clock: Clock | None = None,
-        bare: bool = False,
+        layout: Layout = WHOLE,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -107,7 +108,7 @@ class OpenRun:
             before_nodes: Called when the world is there, and the bus without a node.
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             clock: What nodes take for the time; None: simulated time.
-            bare: Whether robots have the nodes of their hardware only, and no mission.
+            layout: Which nodes of robots there are, and where.
 
         Raises:
             TwinError: The run cannot be made.
@@ -143,7 +144,7 @@ class OpenRun:
                 savings=savings,
                 before_nodes=before_nodes,
                 clock=clock,
-                bare=bare,
+                layout=layout,
             )
             ending.callback(parts.bus.close)
             if bag_tap is not None:
