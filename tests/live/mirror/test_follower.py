@@ -7,7 +7,7 @@ import math
 import pytest
 
 from twin.geometry import Pose2
-from twin.live.follower import Follower
+from twin.live.mirror.follower import Follower
 
 TICK_NS = 20_000_000
 STEP = Pose2(0.4 * 0.02, 0.0, 0.5 * 0.02)

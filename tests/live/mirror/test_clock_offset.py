@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.live.clock_offset import ClockOffset, Offset
+from twin.live.mirror.clock_offset import ClockOffset, Offset
 
 EPOCH_NS = 1_700_000_000_000_000_000
 

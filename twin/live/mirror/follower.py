@@ -59,6 +59,10 @@ class Follower:
         self._jumps = False
         self._driven: deque[tuple[int, Pose2]] = deque()
 
+    def forget(self) -> None:
+        """Forget where the virtual robot was: what comes is stamped by another clock."""
+        self._driven.clear()
+
     def note(self, stamp_ns: int, virtual: Pose2) -> None:
         """Remember where the virtual robot is; times may not go back."""
         self._driven.append((stamp_ns, self.correction.inverse() @ virtual))

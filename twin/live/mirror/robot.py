@@ -1,0 +1,163 @@
+"""One virtual robot beside the physical one whose namespace it shares, but for `/twin` before its own."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from twin.bridge.msgs import Float64, JointState, PoseStamped, TFMessage, ns
+from twin.bridge.qos import SENSOR_DATA
+from twin.geometry import Pose2
+from twin.live.mirror.follower import Difference, Follower, FollowerConfig
+from twin.nodes.messages import pose_stamped
+from twin.runtime.stacks.robot import RobotStack
+from twin.sim.world import World
+
+_PENDING = 200
+_WORLD = "map"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """Something that happened, for whoever watches."""
+
+    stamp_ns: int
+    """By the robot's clock."""
+    what: str
+    """A name: `reset`, `clock`, `values`, `order`."""
+    text: str
+
+
+class MirroredRobot:
+    """`/twin/mirror`: hears the physical robot, moves the virtual one after it, and tells how far it was off."""
+
+    def __init__(
+        self,
+        stack: RobotStack,
+        world: World,
+        *,
+        held: Callable[[], dict[str, str]],
+        config: FollowerConfig | None = None,
+    ) -> None:
+        """Hear the robot of the stack's namespace.
+
+        Args:
+            stack: The virtual robot's nodes.
+            world: It is in.
+            held: Which robot holds each good.
+            config: How hard it follows.
+        """
+        context = stack.context
+        self.stack, self.follower = stack, Follower(config)
+        self.node = node = context.bus.create_node("mirror", context.hardware_namespace)
+        self.difference: Difference | None = None
+        """The latest, before it was corrected."""
+        self.heard_ns: int | None = None
+        """When the latest data came, by the robot's clock."""
+        self.events: list[Told] = []
+        self._world, self._held = world, held
+        self._stepped_ns: int | None = None
+        localisation = context.config.localisation
+        self._is_localised_here = (
+            context.layout.autonomy != "none" and localisation is not None and localisation.type != "none"
+        )
+        self._pending: deque[tuple[int, Pose2]] = deque(maxlen=_PENDING)
+        self._latest_ns = -1
+        self._joints: dict[str, float] = {}
+        commands = stack.handle.description.commands
+        self._positions = {name for name, command in commands.items() if command.interface == "position"}
+        space = context.namespace
+        node.create_subscription(TFMessage, f"{space}/tf", self._on_tf, 100, frozen=True)
+        node.create_subscription(
+            JointState, f"{space}/joint_states", self._on_joints, SENSOR_DATA, frozen=True
+        )
+        self._pose = node.create_publisher(PoseStamped, "pose", 10)
+        self._series = {
+            name: node.create_publisher(Float64, f"divergence/{name}", 10) for name in ("position", "yaw")
+        }
+        node.create_task(self._run())
+
+    def forget(self) -> None:
+        """Begin anew, where the virtual robot is: the robot's clock was set."""
+        self.follower.forget()
+        self._pending.clear()
+        self._latest_ns = -1
+        self._stepped_ns = None
+
+    def _run(self) -> Any:
+        while True:
+            self._step()
+            yield
+
+    def _step(self) -> None:
+        now_ns, world, base = self.node.now_ns, self._world, self.stack.handle.base
+        virtual = world.pose(base).to_pose2()
+        self.follower.note(now_ns, virtual)
+        while self._pending and self._pending[0][0] <= now_ns:
+            self._measure(*self._pending.popleft())
+        elapsed_s = 0.0 if self._stepped_ns is None else (now_ns - self._stepped_ns) * 1e-9
+        self._stepped_ns = now_ns
+        resets = self.follower.resets
+        moved = self.follower.step(virtual, elapsed_s)
+        if self.follower.resets > resets:
+            self.tell("reset", f"put {virtual.distance(moved):.2f} m away, where the physical robot is")
+        motion = moved @ virtual.inverse()
+        if motion.distance(Pose2(0.0, 0.0, 0.0)) > 0.0 or motion.yaw != 0.0:
+            world.shift(base, motion)
+            for good, robot in self._held().items():
+                if robot == self.stack.name:
+                    world.shift(good, motion)
+        for joint, position in self._joints.items():
+            self.stack.handle.hardware.command(joint, position)
+        self._pose.publish(pose_stamped(moved, _WORLD, now_ns))
+
+    def _measure(self, stamp_ns: int, physical: Pose2) -> None:
+        difference = self.follower.measured(stamp_ns, physical)
+        if difference is None:
+            return
+        self.difference = difference
+        self._series["position"].publish(Float64(data=difference.position))
+        self._series["yaw"].publish(Float64(data=difference.yaw))
+
+    def _on_tf(self, message: TFMessage) -> None:
+        frames = self.stack.frames
+        for item in message.transforms:
+            if (item.header.frame_id, item.child_frame_id) != (frames.odom, frames.base):
+                continue
+            stamp_ns = ns(item.header.stamp)
+            pose = _planar(item.transform)
+            if pose is None:
+                self.tell("values", f"a transform from {frames.odom} to {frames.base} that is no pose")
+                continue
+            self.heard_ns = self.node.now_ns
+            if stamp_ns <= self._latest_ns:
+                continue  # repeated, or overtaken
+            self._latest_ns = stamp_ns
+            T_world_odom = self._T_world_odom()
+            if T_world_odom is not None:
+                self._pending.append((stamp_ns, T_world_odom @ pose))
+
+    def _T_world_odom(self) -> Pose2 | None:
+        stack = self.stack
+        found = stack.robot_pose.relative(stack.frames.map, stack.frames.odom)
+        return stack.context.start if found is None and not self._is_localised_here else found
+
+    def _on_joints(self, message: JointState) -> None:
+        for name, position in zip(message.name, message.position, strict=False):
+            if name in self._positions and math.isfinite(position):
+                self._joints[name] = position
+
+    def tell(self, what: str, text: str) -> None:
+        """Note an event, and log it."""
+        self.events.append(Told(stamp_ns=self.node.now_ns, what=what, text=text))
+        self.node.get_logger().warn(f"{what}: {text}")
+
+
+def _planar(transform: Any) -> Pose2 | None:
+    t, q = transform.translation, transform.rotation
+    if not all(map(math.isfinite, (t.x, t.y, t.z, q.x, q.y, q.z, q.w))) or q.z * q.z + q.w * q.w < 0.5:
+        return None
+    return Pose2(t.x, t.y, 2.0 * math.atan2(q.z, q.w))
