@@ -169,6 +169,12 @@ class OpenRun:
                 self._ending.callback(lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
 
+    @property
+    def due_ns(self) -> int | None:
+        """When the present simulated time is due, by `time.perf_counter_ns`; None without a pace."""
+        simulated_s = self.run.world.time_ns * 1e-9
+        return None if self._pace is None else round(self._pace.due_s(simulated_s) * 1e9)
+
     def advance(
         self,
         until: Callable[[], bool] | None = None,

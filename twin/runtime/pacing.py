@@ -31,9 +31,13 @@ class Pace:
         self.lost_s = 0.0
         """How much later the run is for it, by the clock on the wall [s]."""
 
+    def due_s(self, simulated_s: float) -> float:
+        """Return when a simulated time is due, by the clock [s]."""
+        return self._start + simulated_s / self._factor
+
     def keep(self, simulated_s: float) -> None:
         """Wait until the time of a simulated one has come."""
-        ahead = self._start + simulated_s / self._factor - self._clock()
+        ahead = self.due_s(simulated_s) - self._clock()
         if ahead > 0.0:
             self._is_kept = True
             self._sleep(ahead)

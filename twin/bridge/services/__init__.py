@@ -117,7 +117,7 @@ class Client(Endpoint):
         self._sequence = 0
         self._pending: dict[Future, None] = {}
         self.timed: Callable[[int, int, int], None] | None = None
-        """Called, in any thread, with when a request left by `time.monotonic_ns`, when it was answered by the
+        """Called, in any thread, with when a request left by `time.perf_counter_ns`, when it was answered by the
         server's clock, and when the answer was here [ns]; not for servers of this process."""
         node.bus.standard_services.want(name, node.bus.nodes)
         self._bridged = node.bus.naming.wire == "ros2dds"
@@ -198,7 +198,7 @@ class Client(Endpoint):
             if reply.ok is not None:
                 source = parse_attachment(attachment_of(reply.ok)) if self.timed else None
                 if self.timed and source:
-                    self.timed(asked_ns, source.time_ns, time.monotonic_ns())
+                    self.timed(asked_ns, source.time_ns, time.perf_counter_ns())
                 on_response(reply.ok.payload.to_bytes())
 
         def on_end() -> None:
@@ -210,7 +210,7 @@ class Client(Endpoint):
         if self._short and self._services.is_direct and bus.in_own_thread():
             InProcessQuestion(payload, on_response, on_end).ask(self._services.receivers, bus.deliver)
         else:
-            asked_ns = time.monotonic_ns()
+            asked_ns = time.perf_counter_ns()
             self._querier.get(
                 direct(on_reply, on_end),
                 payload=payload,

@@ -27,9 +27,9 @@ class ClockExchanges:
         self.node = bus.create_node("clock_exchanges", namespace)
         self.offset = ClockOffset()
         self.estimate: Offset | None = None
-        """The robot's clock minus `time.monotonic`; None: nobody has answered yet."""
+        """The robot's clock minus `time.perf_counter`; None: nobody has answered yet."""
         self.answered_ns: int | None = None
-        """When an answer came last, by `time.monotonic_ns`."""
+        """When an answer came last, by `time.perf_counter_ns`."""
         self._graph, self._topic, self._own = graph, topic, bus.session_id
         self._client: Client | None = None
         self._asked_ns = 0
@@ -38,7 +38,7 @@ class ClockExchanges:
 
     def update(self) -> bool:
         """Ask if it is time to, take in what has been answered; return whether something has."""
-        now_ns = time.monotonic_ns()
+        now_ns = time.perf_counter_ns()
         if now_ns - self._asked_ns >= _PERIOD_NS:
             self._ask(now_ns)
         fresh = False
@@ -50,11 +50,10 @@ class ClockExchanges:
             self.estimate = self.offset.estimate()
         return fresh
 
-    def other_ns(self) -> int | None:
-        """Return what the robot's clock shows now [ns since 1970]; None while nobody has answered."""
+    def other_ns(self, now_ns: int) -> int | None:
+        """Return what the robot's clock shows at a time of `time.perf_counter_ns`; None while nobody has answered."""
         if self.estimate is None or self.answered_ns is None:
             return None
-        now_ns = time.monotonic_ns()
         drifted = (now_ns - self.answered_ns) * self.estimate.drift
         return now_ns + round(self.estimate.offset_s * 1e9) + round(drifted)
 

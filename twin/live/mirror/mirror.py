@@ -138,10 +138,12 @@ class Mirror:
         return False
 
     def _set_clock(self) -> None:
-        other_ns, estimate = self.exchanges.other_ns(), self.exchanges.estimate
+        # What is due now may come later: a machine that stutters is no reason to set clocks.
+        due_ns, estimate = self.run.due_ns, self.exchanges.estimate
+        other_ns = self.exchanges.other_ns(time.perf_counter_ns() if due_ns is None else due_ns)
         assert other_ns is not None and estimate is not None
         set_by = self.clock.follow(other_ns, round(estimate.bound_s * 1e9))
-        if set_by:
+        if set_by and self.run.run.world.time_ns:
             for robot in self.robots:
                 robot.forget()
                 robot.tell("clock", f"set by {set_by * 1e-9:+.3f} s to the robot's")
