@@ -13,7 +13,6 @@ from twin.files.writing import check_file, make_folder
 from twin.live.device_clock import RIGHT, ClockError, DeviceClock
 from twin.runtime.open_run import OpenRun
 from twin.runtime.stacks.context import Layout
-from twin.scenario.missions import Idle
 from twin.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -52,9 +51,8 @@ class Plant:
         Raises:
             TwinError: A robot cannot be made, or nobody can be reached.
         """
-        alone = {"mission": Idle(type="idle"), "missions": ()}
-        changes = {"checks": (), "early_stop": "never", "duration": _FOR_EVER_S}
-        scenario = scenario.model_copy(update=changes | ({} if autonomy else alone))
+        changes: dict[str, object] = {"checks": (), "early_stop": "never", "duration": _FOR_EVER_S}
+        scenario = scenario.model_copy(update=changes)
         self.clock = DeviceClock(time.time_ns() if start_ns is None else start_ns, error)
         with ExitStack() as ending:
             self._rows: Any = None

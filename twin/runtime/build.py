@@ -197,7 +197,7 @@ def _namespace(scenario: Scenario, robot: RobotConfig) -> str:
 
 
 def _options(scenario: Scenario, layout: Layout) -> NodeOptions | None:
-    """Return what robots' nodes are told, if several share the graph: simulated ones, or these and physical ones."""
+    """Return what robots' nodes are told if several share the graph, simulated or physical ones."""
     rules = []
     if layout.hardware:
         spaces = [_namespace(scenario, robot) for robot in scenario.robots]

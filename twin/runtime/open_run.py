@@ -71,7 +71,7 @@ class OpenRun:
         *,
         out: Path | None = None,
         record: bool = True,
-        pace: float | None = None,
+        pace: Pace | float | None = None,
         listen: Sequence[str] = (),
         network: SessionConfig | None = None,
         outside: Outside = ALONE,
@@ -163,7 +163,7 @@ class OpenRun:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
                 self._sink.declare(parts.world, wheels)
-            self._pace = None if pace is None else Pace(pace)
+            self._pace = Pace(pace) if isinstance(pace, int | float) else pace
             self._ending = ending.pop_all()
             if out is not None:
                 self._ending.callback(lambda: self.kept().write(out))

@@ -117,8 +117,8 @@ class Client(Endpoint):
         self._sequence = 0
         self._pending: dict[Future, None] = {}
         self.timed: Callable[[int, int, int], None] | None = None
-        """Called, in any thread, with when a request left by `time.perf_counter_ns`, when it was answered by the
-        server's clock, and when the answer was here [ns]; not for servers of this process."""
+        """Called, in any thread, with when a request left by `time.perf_counter_ns`, when it was answered by
+        the server's clock, and when the answer was here [ns]; not for servers of this process."""
         node.bus.standard_services.want(name, node.bus.nodes)
         self._bridged = node.bus.naming.wire == "ros2dds"
         self._querier = node.bus.wire.declare(

@@ -51,7 +51,7 @@ class ClockExchanges:
         return fresh
 
     def other_ns(self, now_ns: int) -> int | None:
-        """Return what the robot's clock shows at a time of `time.perf_counter_ns`; None while nobody has answered."""
+        """Return what the robot's clock shows at a `time.perf_counter_ns`; None: nobody has answered."""
         if self.estimate is None or self.answered_ns is None:
             return None
         drifted = (now_ns - self.answered_ns) * self.estimate.drift

@@ -26,7 +26,7 @@ class FollowerConfig:
     """Of a correction [m/s], beside what the robot drives."""
     max_turn: float = 1.0
     """Of a correction [rad/s]."""
-    gain: float = 4.0
+    gain: float = 10.0
     """Share of what is left that is corrected [1/s]."""
     reset_distance: float = 0.5
     """Beyond it [m] the virtual robot is put where the physical one is, at once."""

@@ -17,6 +17,7 @@ from twin.live.mirror.followed_clock import FollowedClock
 from twin.live.mirror.label import LABELS, Evidence, Judgement, judge
 from twin.live.mirror.robot import MirroredRobot
 from twin.runtime.open_run import OpenRun
+from twin.runtime.pacing import Pace
 from twin.runtime.stacks.context import Layout
 from twin.scenario.schema import Scenario
 
@@ -27,6 +28,8 @@ NAMESPACE = "/twin"
 """Before the namespaces of virtual robots."""
 _FOR_EVER_S = 1e9
 _STATUS_NS = 100_000_000
+_SLACK_S = 1.0
+"""It makes up for what it is behind: the physical robots do not wait."""
 _MEETING_S = 2.0
 _FIRST_ANSWERS = 5
 _LOOK_S = 0.02
@@ -52,22 +55,21 @@ class Mirror:
         network: SessionConfig,
         autonomy: Literal["all", "localisation", "none"] = "none",
         out: Path | None = None,
-        pace: float | None = 1.0,
     ) -> None:
         """Build the virtual robots, and join the graph.
 
         Args:
-            scenario: Its robots and world; also its localisation, navigation and missions, as `autonomy` says.
+            scenario: Its robots and world; its localisation, navigation and missions, as `autonomy` says.
             network: Where the physical robots are.
             autonomy: What of the physical robots' autonomy runs here.
             out: Folder for a recording; None: there is none.
-            pace: Simulated seconds per second.
 
         Raises:
             TwinError: A robot cannot be made, or nobody can be reached.
         """
         changes: dict[str, object] = {"faults": (), "early_stop": "never", "duration": _FOR_EVER_S}
         self.clock = FollowedClock(time.time_ns())
+        pace = Pace(1.0, slack_s=_SLACK_S)
         with ExitStack() as ending:
             self.run = OpenRun(
                 scenario.model_copy(update=changes),
@@ -93,9 +95,10 @@ class Mirror:
             node = run.bus.create_node("status", NAMESPACE)
             self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
             self._label = node.create_publisher(String, "label", LATCHED)
-            self._told_ns = 0
+            self._told_ns = self._steps = 0
             self._labels: dict[str, str] = {}
             self._meet()
+            pace.start()
             self._ending = ending.pop_all()
 
     def advance(self, until: Callable[[], bool] = lambda: False) -> None:
@@ -141,12 +144,18 @@ class Mirror:
         # What is due now may come later: a machine that stutters is no reason to set clocks.
         due_ns, estimate = self.run.due_ns, self.exchanges.estimate
         other_ns = self.exchanges.other_ns(time.perf_counter_ns() if due_ns is None else due_ns)
-        assert other_ns is not None and estimate is not None
-        set_by = self.clock.follow(other_ns, round(estimate.bound_s * 1e9))
-        if set_by and self.run.run.world.time_ns:
-            for robot in self.robots:
+        assert other_ns is not None
+        assert estimate is not None
+        set_by = self.clock.follow(other_ns, round(estimate.bound_s * 1e9)) * 1e-9
+        steps, self._steps = self._steps, self.exchanges.offset.steps
+        if not set_by or not self.run.run.world.time_ns:
+            return
+        for robot in self.robots:
+            if self._steps > steps or set_by < 0.0:
                 robot.forget()
-                robot.tell("clock", f"set by {set_by * 1e-9:+.3f} s to the robot's")
+                robot.tell("clock", f"the robot's clock was set by {set_by:+.3f} s")
+            else:
+                robot.tell("pace", f"this computer was too slow: {set_by:.3f} s are lost")
 
     def _meet(self) -> None:
         """Wait for the first answers, so that the first stamps are those of the robot's clock."""
@@ -170,7 +179,7 @@ class Mirror:
             }
             array.status.append(
                 DiagnosticStatus(
-                    level=bytes([_LEVELS[label]]),
+                    level=_LEVELS[label],
                     name=f"twin: {status.robot}",
                     message=f"{label}: {'; '.join(status.judgement.why)}".removesuffix(": "),
                     hardware_id=status.robot,

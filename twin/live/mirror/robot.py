@@ -32,7 +32,7 @@ class Told:
 
 
 class MirroredRobot:
-    """`/twin/mirror`: hears the physical robot, moves the virtual one after it, and tells how far it was off."""
+    """`/twin/mirror`: hears the physical robot, moves the virtual one after it, tells how far it was."""
 
     def __init__(
         self,

@@ -15,7 +15,6 @@ from twin.bridge.tf import TransformBuffer, TransformError
 from twin.geometry import Array, Pose2
 from twin.nodes.messages import path_array
 
-
 _MOST_EARLY = 5
 """So many messages of a topic wait for odometry; the oldest gives way."""
 
@@ -56,9 +55,10 @@ class RobotPose:
         return self.relative(target, header.frame_id, ns(header.stamp))
 
     def placed(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return a callback that waits until odometry tells where a message was measured, if it overtook that.
+        """Return a callback that waits until odometry tells where a message was measured.
 
-        Messages of other processes may, even those of one robot. It is what tf2_ros::MessageFilter is for.
+        Messages of other processes may come before the transforms that they need, even those of one robot:
+        what tf2_ros::MessageFilter is for.
         """
         early: deque[Future] = deque()
 
