@@ -34,6 +34,7 @@ class Plant:
         network: SessionConfig,
         autonomy: bool = False,
         truth: Path | None = None,
+        bag: Path | None = None,
         pace: float | None = 1.0,
         start_ns: int | None = None,
     ) -> None:
@@ -45,6 +46,7 @@ class Plant:
             network: Where others reach them.
             autonomy: Whether localisation, navigation and missions run on the robots, too.
             truth: A CSV file for where they really are, each tick; nobody but a test may look.
+            bag: Folder for a bag of what the robots say and hear.
             pace: Simulated seconds per second; None: as fast as possible.
             start_ns: Time of day at the start [ns]; None: now.
 
@@ -67,6 +69,7 @@ class Plant:
                 record=False,
                 network=network,
                 pace=pace,
+                bag=bag,
                 clock=self.clock,
                 layout=Layout(autonomy="all" if autonomy else "none"),
             )

@@ -36,11 +36,12 @@ def mirror(
     from twin.bridge.wire.interrupts import noted_signals
     from twin.bridge.wire.session import SessionConfig
     from twin.cli.run.options import parse_overrides
+    from twin.live.mirror.live_source import LiveSource
     from twin.live.mirror.mirror import Mirror
     from twin.scenario.schema import load
 
     show_warnings()
     described = load(scenario, parse_overrides(set or (), seed), execute=True)
     network = SessionConfig(mode="client", connect=tuple(connect or (DEFAULT_ENDPOINT,)), domain_id=domain)
-    with Mirror(described, network=network, autonomy=autonomy) as robots, noted_signals() as received:
+    with Mirror(described, LiveSource(network), autonomy=autonomy) as robots, noted_signals() as received:
         robots.advance(lambda: bool(received))
