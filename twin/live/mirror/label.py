@@ -14,6 +14,9 @@ LABELS: tuple[Label, ...] = ("model", "shadow", "twin")
 """Each asks for more than those before it."""
 
 
+NOBODY = "nothing commands the robot from here"
+
+
 @dataclass(frozen=True, kw_only=True)
 class LabelConfig:
     """What each word asks for."""
@@ -44,7 +47,7 @@ class Evidence:
     """The robot's clock is known so well [s]; None: it is not."""
     acknowledged: bool = False
     """Whether what was last commanded from here was obeyed, as its acknowledgement or its motion tells."""
-    commands: str = "nothing commands the robot from here"
+    commands: str = NOBODY
     """Why `acknowledged` is false, if it is."""
     doubts: tuple[str, ...] = ()
     """What else forbids the word `twin`: two robots with one name, data that cannot be."""

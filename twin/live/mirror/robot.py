@@ -8,10 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from twin.bridge.msgs import Float64, JointState, PoseStamped, TFMessage, ns
+from twin.bridge.msgs import Float64, JointState, Odometry, PoseStamped, TFMessage, Twist, ns
 from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.topics import Publisher
 from twin.geometry import Pose2
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
+from twin.live.mirror.label import Evidence, judge
+from twin.live.mirror.obedience import Obedience
+from twin.live.mirror.source import Source
+from twin.live.mirror.status import Status
 from twin.nodes.messages import pose_stamped
 from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World
@@ -51,7 +56,7 @@ class MirroredRobot:
             config: How hard it follows.
         """
         context = stack.context
-        self.stack, self.follower = stack, Follower(config)
+        self.stack, self.follower, self.obedience = stack, Follower(config), Obedience()
         self.node = node = context.bus.create_node("mirror", context.hardware_namespace)
         self.difference: Difference | None = None
         """The latest, before it was corrected."""
@@ -66,6 +71,7 @@ class MirroredRobot:
         )
         self._pending: deque[tuple[int, Pose2]] = deque(maxlen=_PENDING)
         self._latest_ns = -1
+        self._physical: Pose2 | None = None
         self._joints: dict[str, float] = {}
         commands = stack.handle.description.commands
         self._positions = {name for name, command in commands.items() if command.interface == "position"}
@@ -74,11 +80,36 @@ class MirroredRobot:
         node.create_subscription(
             JointState, f"{space}/joint_states", self._on_joints, SENSOR_DATA, frozen=True
         )
+        node.create_subscription(Odometry, f"{space}/odom", self._on_odometry, 10, frozen=True)
+        self._commands = node.create_subscription(
+            Twist, f"{space}/cmd_vel", self._on_command, 10, frozen=True
+        )
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
         self._series = {
             name: node.create_publisher(Float64, f"divergence/{name}", 10) for name in ("position", "yaw")
         }
         node.create_task(self._run())
+
+    def status(self, now_ns: int, source: Source) -> Status:
+        """Return how it is mirrored at a time of the robot's clock [ns]."""
+        difference, heard_ns = self.difference, self.heard_ns
+        evidence = Evidence(
+            age_s=None if heard_ns is None else max(0.0, (now_ns - heard_ns) * 1e-9),
+            position=None if difference is None else difference.position,
+            yaw=None if difference is None else difference.yaw,
+            clock_bound_s=source.clock_bound_s,
+            acknowledged=source.is_live and self.obedience.obeyed is True,
+            commands=self.obedience.text if source.is_live else "a bag obeys no commands",
+        )
+        return Status(
+            robot=self.stack.name,
+            judgement=judge(evidence),
+            evidence=evidence,
+            virtual=self._world.pose(self.stack.handle.base).to_pose2(),
+            physical=self._physical,
+            clock_offset_s=source.clock_offset_s,
+            resets=self.follower.resets,
+        )
 
     def forget(self) -> None:
         """Begin anew, where the virtual robot is: the robot's clock was set."""
@@ -118,7 +149,7 @@ class MirroredRobot:
         difference = self.follower.measured(stamp_ns, physical)
         if difference is None:
             return
-        self.difference = difference
+        self.difference, self._physical = difference, physical
         self._series["position"].publish(Float64(data=difference.position))
         self._series["yaw"].publish(Float64(data=difference.yaw))
 
@@ -149,6 +180,20 @@ class MirroredRobot:
         for name, position in zip(message.name, message.position, strict=False):
             if name in self._positions and math.isfinite(position):
                 self._joints[name] = position
+
+    def _on_command(self, message: Twist) -> None:
+        source = self._commands.source
+        if source is not None and source.gid in self._own_commands():
+            self.obedience.command(self.node.now_ns, message.linear.x, message.angular.z)
+
+    def _own_commands(self) -> set[bytes]:
+        """Return who commands the physical robot from this process."""
+        ends = [end for node in self.node.bus.nodes for end in node.endpoints]
+        return {end.gid for end in ends if isinstance(end, Publisher) and end.name == self._commands.name}
+
+    def _on_odometry(self, message: Odometry) -> None:
+        twist = message.twist.twist
+        self.obedience.motion(self.node.now_ns, twist.linear.x, twist.angular.z)
 
     def tell(self, what: str, text: str) -> None:
         """Note an event, and log it."""
