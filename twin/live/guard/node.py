@@ -23,7 +23,8 @@ _OUTPUT_PERIOD_NS = 20_000_000
 _QUIET_S = 5.0
 """So long a refusal is not told of again in the log."""
 _LONGEST_NAME = 100
-_ACKNOWLEDGEMENTS = QoS(depth=100)
+_EACH = QoS(depth=100)
+"""Every command is judged, and acknowledged, when a cable that was cut lets all of them through at once."""
 _TYPES: dict[str, type[Any]] = {
     "geometry_msgs/msg/Twist": Twist,
     "geometry_msgs/msg/TwistStamped": TwistStamped,
@@ -75,7 +76,7 @@ class GuardNode:
         self._outputs: dict[str, Publisher[Any]] = {}
         """By type."""
         self._warnings: tuple[str, ...] = ()
-        self._acknowledged = node.create_publisher(DiagnosticArray, "~/acknowledged", _ACKNOWLEDGEMENTS)
+        self._acknowledged = node.create_publisher(DiagnosticArray, "~/acknowledged", _EACH)
         self._status = node.create_publisher(DiagnosticArray, "~/status", LATCHED)
         self._hear(Lane.AUTONOMY, topics.commands)
         self._hear(Lane.OPERATOR, topics.teleop)
@@ -111,7 +112,9 @@ class GuardNode:
             source = heard.source
             self._on_command(lane, None if source is None else source.gid, message)
 
-        heard: Subscription[TwistStamped] = self.node.create_subscription(TwistStamped, topic, on_command, 10)
+        heard: Subscription[TwistStamped] = self.node.create_subscription(
+            TwistStamped, topic, on_command, _EACH
+        )
 
     def _on_command(self, lane: Lane, sender: bytes | None, message: TwistStamped) -> None:
         linear, angular = message.twist.linear, message.twist.angular
