@@ -162,12 +162,12 @@ def test_names_of_topics() -> None:
 
 def test_a_stop_by_a_client_holds_until_a_release(world: World) -> None:
     client = released(world)
-    client.send(Velocity(0.3))
-    world.spin(50)
+    assert client.send(Velocity(0.2)) < client.send(Velocity(0.3))
+    world.spin(60)
     assert world.speed == 0.3
     request = client.stop()
     world.spin(20)
-    assert world.speed == 0.0
+    assert world.speed == 0.0, "before the next multiple of the period"
     world.spin(50)
     assert request.is_accepted
     assert client.is_stopped
@@ -197,6 +197,24 @@ def test_plain_tools_stop_and_release_by_services_and_topics(world: World) -> No
     world.spin()
     assert client.status is not None
     assert client.status.stopped_by == "somebody"
+
+
+def test_commands_without_a_stamp_have_the_middlewares(world: World) -> None:
+    client = released(world)
+    said: list[DiagnosticArray] = []
+    plain = world.bus.create_node("plain")
+    plain.create_subscription(DiagnosticArray, "/guard/acknowledged", said.append, 10)
+    commands = plain.create_publisher(Twist, "/guard/cmd_vel", 10)
+    world.spin()
+    for speed in (0.3, 0.2):
+        sent_ns = world.clock.now_ns
+        commands.publish(Twist(Vector3(speed, 0.0, 0.0), new(Vector3)))
+        world.spin()
+        assert world.speed == speed
+        assert (said[-1].status[0].message, ns(said[-1].header.stamp)) == ("accepted", sent_ns)
+    client.send(Velocity(0.1))
+    world.spin()
+    assert said[-1].status[0].message == "rival"
 
 
 def test_another_publisher_and_another_guard_are_told_of(world: World) -> None:

@@ -60,12 +60,8 @@ def guard(
         ),
     ] = 1.0,
     cmd_vel: Annotated[str, typer.Option(metavar="TOPIC", help="That the robot listens to.")] = "cmd_vel",
-    commands: Annotated[
-        str, typer.Option(metavar="TOPIC", help="Of autonomy's commands, TwistStamped.")
-    ] = "~/cmd_vel",
-    teleop: Annotated[
-        str, typer.Option(metavar="TOPIC", help="Of the operator's commands, TwistStamped.")
-    ] = "~/teleop",
+    commands: Annotated[str, typer.Option(metavar="TOPIC", help="Of autonomy's commands.")] = "~/cmd_vel",
+    teleop: Annotated[str, typer.Option(metavar="TOPIC", help="Of the operator's commands.")] = "~/teleop",
     namespace: Namespace = "",
     released: Annotated[
         bool, typer.Option("--released", help="Let the robot move without a first `twin guard release`.")

@@ -25,10 +25,8 @@ _QUIET_S = 5.0
 _LONGEST_NAME = 100
 _EACH = QoS(depth=100)
 """Every command is judged, and acknowledged, when a cable that was cut lets all of them through at once."""
-_TYPES: dict[str, type[Any]] = {
-    "geometry_msgs/msg/Twist": Twist,
-    "geometry_msgs/msg/TwistStamped": TwistStamped,
-}
+_STAMPED = "geometry_msgs/msg/TwistStamped"
+_TYPES: dict[str, type[Any]] = {"geometry_msgs/msg/Twist": Twist, _STAMPED: TwistStamped}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,9 +36,9 @@ class GuardTopics:
     cmd_vel: str = "cmd_vel"
     """That the robot listens to; its type is what the robot asks for."""
     commands: str = "~/cmd_vel"
-    """Autonomy's."""
+    """Autonomy's: TwistStamped, or Twist."""
     teleop: str = "~/teleop"
-    """The operator's."""
+    """The operator's, in the same way."""
 
 
 class GuardNode:
@@ -78,8 +76,12 @@ class GuardNode:
         self._warnings: tuple[str, ...] = ()
         self._acknowledged = node.create_publisher(DiagnosticArray, "~/acknowledged", _EACH)
         self._status = node.create_publisher(DiagnosticArray, "~/status", LATCHED)
-        self._hear(Lane.AUTONOMY, topics.commands)
-        self._hear(Lane.OPERATOR, topics.teleop)
+        self._inputs: set[tuple[str, str]] = set()
+        """Topics and types."""
+        self._lanes = {
+            node.resolve_name(topics.commands): Lane.AUTONOMY,
+            node.resolve_name(topics.teleop): Lane.OPERATOR,
+        }
         node.create_subscription(Header, "~/stop", self._on_stop, 10)
         node.create_subscription(Header, "~/release", self._on_release, 10)
         node.create_service(srvs.Trigger, "~/stop", self._on_stop_request)
@@ -107,14 +109,14 @@ class GuardNode:
         self._publish(STILL)
         self.node.destroy()
 
-    def _hear(self, lane: Lane, topic: str) -> None:
-        def on_command(message: TwistStamped) -> None:
+    def _hear(self, lane: Lane, topic: str, kind: type[Any]) -> None:
+        def on_command(message: Any) -> None:
             source = heard.source
+            if kind is Twist:  # has no stamp, but the middleware's
+                message = TwistStamped(header(0 if source is None else source.time_ns, ""), message)
             self._on_command(lane, None if source is None else source.gid, message)
 
-        heard: Subscription[TwistStamped] = self.node.create_subscription(
-            TwistStamped, topic, on_command, _EACH
-        )
+        heard: Subscription[Any] = self.node.create_subscription(kind, topic, on_command, _EACH)
 
     def _on_command(self, lane: Lane, sender: bytes | None, message: TwistStamped) -> None:
         linear, angular = message.twist.linear, message.twist.angular
@@ -155,7 +157,7 @@ class GuardNode:
         was = self.gate.stopped_by
         verdict = self.gate.release(seen_ns, self._now())
         if was is not None and verdict is Verdict.ACCEPTED:
-            self.node.get_logger().warning(f"released by {by or 'somebody'}, was stopped by {was}")
+            self.node.get_logger().info(f"released by {by or 'somebody'}, was stopped by {was}")
             self._tell()
         return verdict
 
@@ -177,10 +179,9 @@ class GuardNode:
     def _publish(self, velocity: Velocity) -> None:
         twist = Twist(Vector3(velocity.x, velocity.y, 0.0), Vector3(0.0, 0.0, velocity.yaw))
         for publisher in self._outputs.values():
-            stamped = publisher.msgtype.endswith("Stamped")
-            publisher.publish(
-                TwistStamped(header(self.node.now_ns, ""), twist) if stamped else twist, frozen=True
-            )
+            stamped = publisher.msgtype == _STAMPED
+            message = TwistStamped(header(self.node.now_ns, ""), twist) if stamped else twist
+            publisher.publish(message, frozen=True)
 
     def _tell(self) -> None:
         state = self.state
@@ -188,8 +189,14 @@ class GuardNode:
         self._status.publish(state.message(), frozen=True)
 
     def _look(self) -> None:
-        """See which type the robot listens to, and who else commands it."""
+        """See which types the robot listens to and others send, and who else commands it."""
         self._changes = self._graph.changes
+        for topic, lane in self._lanes.items():
+            sent = {sender.type for sender in self._graph.publishers(topic)} | {_STAMPED}
+            for typename in sorted(sent & _TYPES.keys()):
+                if (topic, typename) not in self._inputs:
+                    self._inputs.add((topic, typename))
+                    self._hear(lane, topic, _TYPES[typename])
         listeners = self._graph.subscriptions(self.cmd_vel)
         for typename in {listener.type for listener in listeners} & _TYPES.keys() - self._outputs.keys():
             publisher = self.node.create_publisher(_TYPES[typename], self.cmd_vel, 1)
