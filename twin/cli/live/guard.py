@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from twin.cli.option_groups import example
-from twin.cli.ros.joining import Joining, joins, on_graph, tool_node
+from twin.cli.ros.joining import PATIENCE_S, Joining, joins, on_graph, tool_node
 
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
@@ -92,7 +92,7 @@ def guard(
         max_age=max_age,
     )
     topics = GuardTopics(cmd_vel=cmd_vel, commands=commands, teleop=teleop)
-    with joining.by_wall_time.open() as live, noted_signals() as received:
+    with joining.by_wall_time.open(PATIENCE_S) as live, noted_signals() as received:
         node = GuardNode(live.bus, Graph.watch(live.bus), config, topics=topics, namespace=namespace)
         if released:
             node.gate.release(None, 0)
