@@ -65,6 +65,7 @@ TABLE = {
     "view": Command(_ROBOTS, "Look at a robot file, and move its joints.", "model.view", "view", "twin view my_robot.urdf --joint lift_joint=0.5", needs_arguments=True),
     "router": Command(_GRAPH, "Run a Zenoh router, as rmw_zenohd, until Ctrl-C.", "ros.router", "router", "twin router --listen tcp/127.0.0.1:7447"),
     "exec": Command(_GRAPH, "Run nodes beside a simulation until it ends, or Ctrl-C.", "exec", "execute", "twin exec my_controller.py:make_node --lockstep", needs_arguments=True),
+    "guard": Command(_GRAPH, "Guard a robot: limits, watchdog, emergency stop.", "live.guard", example="twin guard --robot my_robot.urdf --max-speed 0.5"),
     "topic": Command(_GRAPH, "Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.", "ros.topic"),
     "node": Command(_GRAPH, "Nodes: list, look, draw; as `ros2 node` and rqt_graph.", "ros.node"),
     "service": Command(_GRAPH, "Services: list, look, call; as `ros2 service`.", "ros.service"),
