@@ -202,6 +202,11 @@ def _options(scenario: Scenario, layout: Layout) -> NodeOptions | None:
     if layout.hardware:
         spaces = [_namespace(scenario, robot) for robot in scenario.robots]
         rules = [RemapRule(f"{layout.hardware}{space}/cmd_vel", f"{space}/cmd_vel") for space in spaces]
+        if layout.commands:
+            rules += [
+                RemapRule(f"{space}/cmd_vel", f"{layout.hardware}{space}/{layout.commands}")
+                for space in spaces
+            ]
     elif len(scenario.robots) == 1:
         return None
     return NodeOptions(arguments=RosArguments(remappings=(*_TREE_EACH, *rules)))

@@ -49,6 +49,10 @@ def mirror(
     duration: Annotated[
         float | None, typer.Option(metavar="SECONDS", min=0.0, help="How long.", show_default="until Ctrl-C")
     ] = None,
+    guard: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Command the robot through its `twin guard`, by this node's name."),
+    ] = None,
     status: Annotated[
         bool, typer.Option("--status", help="Print what a mirror that is running tells, and end.")
     ] = False,
@@ -69,7 +73,9 @@ def mirror(
     show_warnings()
     described = load(scenario, parse_overrides(set or (), seed), execute=True)
     with (
-        Mirror(described, _source(bag, connect, domain), autonomy=autonomy, bag=record) as robots,
+        Mirror(
+            described, _source(bag, connect, domain), autonomy=autonomy, guard=guard, bag=record
+        ) as robots,
         noted_signals() as received,
         _shown(robots) as show,
     ):

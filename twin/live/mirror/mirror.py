@@ -11,7 +11,7 @@ from twin.bridge.msgs import DiagnosticArray, String
 from twin.bridge.qos import LATCHED
 from twin.live.mirror.followed_clock import FollowedClock
 from twin.live.mirror.label import Label
-from twin.live.mirror.robot import MirroredRobot
+from twin.live.mirror.robot import COMMANDED, MirroredRobot
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status, to_array, worst
 from twin.runtime.open_run import OpenRun
@@ -33,6 +33,7 @@ class Mirror:
         source: Source,
         *,
         autonomy: Literal["all", "localisation", "none"] = "none",
+        guard: str | None = None,
         out: Path | None = None,
         bag: Path | None = None,
     ) -> None:
@@ -42,6 +43,8 @@ class Mirror:
             scenario: Its robots and world; its localisation, navigation and missions, as `autonomy` says.
             source: Where the physical robots are.
             autonomy: What of the physical robots' autonomy runs here.
+            guard: Name of the guards' nodes, behind the robots' namespaces, through which autonomy here
+                commands them; None: it does by `cmd_vel`.
             out: Folder for a recording; None: there is none.
             bag: Folder for a bag of everything that was heard and said; it can be a source again.
 
@@ -60,13 +63,15 @@ class Mirror:
                 pace=source.pace,
                 bag=bag,
                 clock=self.clock,
-                layout=Layout(autonomy=autonomy, hardware=NAMESPACE),
+                layout=Layout(
+                    autonomy=autonomy, hardware=NAMESPACE, commands="" if guard is None else COMMANDED
+                ),
             )
             ending.callback(self.run.close)
             run = self.run.run
             stacks = run.parts.stacks.values()
             self.robots = tuple(
-                MirroredRobot(stack, run.world, held=run.observer.holders) for stack in stacks
+                MirroredRobot(stack, run.world, held=run.observer.holders, guard=guard) for stack in stacks
             )
             node = run.bus.create_node("status", NAMESPACE)
             self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +13,9 @@ from twin.bridge.msgs import Float64, JointState, Odometry, PoseStamped, TFMessa
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.topics import Publisher
 from twin.geometry import Pose2
+from twin.live.guard.client import GuardClient
+from twin.live.guard.gate import Velocity
+from twin.live.guard.verdict import Verdict
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
 from twin.live.mirror.label import Evidence, judge
 from twin.live.mirror.obedience import Obedience
@@ -23,6 +27,8 @@ from twin.sim.world import World
 
 _PENDING = 200
 _WORLD = "map"
+COMMANDED = "commanded"
+"""Topic, in the virtual robot's namespace, of what autonomy here commands if a guard is to pass it on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +51,7 @@ class MirroredRobot:
         world: World,
         *,
         held: Callable[[], dict[str, str]],
+        guard: str | None = None,
         config: FollowerConfig | None = None,
     ) -> None:
         """Hear the robot of the stack's namespace.
@@ -53,6 +60,8 @@ class MirroredRobot:
             stack: The virtual robot's nodes.
             world: It is in.
             held: Which robot holds each good.
+            guard: Name of the guard's node, behind the robot's namespace, through which autonomy here
+                commands the robot; None: it does by `cmd_vel`.
             config: How hard it follows.
         """
         context = stack.context
@@ -84,6 +93,10 @@ class MirroredRobot:
         self._commands = node.create_subscription(
             Twist, f"{space}/cmd_vel", self._on_command, 10, frozen=True
         )
+        self.guard: GuardClient | None = None
+        if guard is not None:
+            self.guard = GuardClient(node, guard=f"{space}/{guard}", monotonic_ns=time.perf_counter_ns)
+            node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
         self._series = {
             name: node.create_publisher(Float64, f"divergence/{name}", 10) for name in ("position", "yaw")
@@ -93,13 +106,16 @@ class MirroredRobot:
     def status(self, now_ns: int, source: Source) -> Status:
         """Return how it is mirrored at a time of the robot's clock [ns]."""
         difference, heard_ns = self.difference, self.heard_ns
+        acknowledged, commands = self._obeyed() if source.is_live else (False, "a bag obeys no commands")
+        guarded = self.guard.status if self.guard is not None and self.guard.is_present else None
         evidence = Evidence(
             age_s=None if heard_ns is None else max(0.0, (now_ns - heard_ns) * 1e-9),
             position=None if difference is None else difference.position,
             yaw=None if difference is None else difference.yaw,
             clock_bound_s=source.clock_bound_s,
-            acknowledged=source.is_live and self.obedience.obeyed is True,
-            commands=self.obedience.text if source.is_live else "a bag obeys no commands",
+            acknowledged=acknowledged,
+            commands=commands,
+            doubts=() if guarded is None else guarded.warnings,
         )
         return Status(
             robot=self.stack.name,
@@ -180,6 +196,25 @@ class MirroredRobot:
         for name, position in zip(message.name, message.position, strict=False):
             if name in self._positions and math.isfinite(position):
                 self._joints[name] = position
+
+    def _send(self, message: Twist) -> None:
+        assert self.guard is not None
+        self.guard.send(Velocity(message.linear.x, message.linear.y, message.angular.z))
+
+    def _obeyed(self) -> tuple[bool, str]:
+        """Return whether the robot does what is commanded from here, and in words."""
+        if self.guard is None:
+            return self.obedience.obeyed is True, self.obedience.text
+        if not self.guard.is_present or self.guard.status is None:
+            return False, "the robot's guard does not answer"
+        if self.guard.status.is_stopped:
+            return False, self.guard.status.words
+        if self.guard.latest is None:
+            return False, "nothing has been commanded through the guard"
+        verdict, trip_s = self.guard.latest.said.verdict, self.guard.latest.round_trip_s
+        if verdict is not Verdict.ACCEPTED:
+            return False, f"the guard refuses what is commanded from here: {verdict}"
+        return True, f"acknowledged by the guard, the latest in {1e3 * trip_s:.0f} ms"
 
     def _on_command(self, message: Twist) -> None:
         source = self._commands.source

@@ -22,6 +22,8 @@ class Layout:
     hardware: str = ""
     """Before the namespaces of the hardware's nodes: with `/twin` they are beside a physical robot, which
     obeys the same `cmd_vel`, and which autonomy is then about."""
+    commands: str = ""
+    """Topic on which autonomy commands, behind `hardware` and the robot's namespace; empty: `cmd_vel`."""
 
 
 WHOLE = Layout()
