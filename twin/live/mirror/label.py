@@ -24,7 +24,7 @@ class LabelConfig:
     fresh_s: float = 0.4
     """A twin's latest data may be so old [s]."""
     lost_s: float = 5.0
-    """A shadow's may be so old [s]: after that the virtual robot goes on alone."""
+    """A shadow's may be so old [s]."""
     position: float = 0.25
     """A twin is no farther from the physical robot than that [m]."""
     yaw: float = 0.35

@@ -17,7 +17,7 @@ from twin.live.guard.client import GuardClient
 from twin.live.guard.gate import Velocity
 from twin.live.guard.verdict import Verdict
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
-from twin.live.mirror.label import Evidence, judge
+from twin.live.mirror.label import Evidence, LabelConfig, judge
 from twin.live.mirror.obedience import Obedience
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status
@@ -93,6 +93,7 @@ class MirroredRobot:
         self._commands = node.create_subscription(
             Twist, f"{space}/cmd_vel", self._on_command, 10, frozen=True
         )
+        self._relayed = node.create_publisher(Twist, "cmd_vel", 10)
         self.guard: GuardClient | None = None
         if guard is not None:
             self.guard = GuardClient(node, guard=f"{space}/{guard}", monotonic_ns=time.perf_counter_ns)
@@ -217,9 +218,18 @@ class MirroredRobot:
         return True, f"acknowledged by the guard, the latest in {1e3 * trip_s:.0f} ms"
 
     def _on_command(self, message: Twist) -> None:
+        if self._flows():
+            self._relayed.publish(message, frozen=True)
         source = self._commands.source
         if source is not None and source.gid in self._own_commands():
             self.obedience.command(self.node.now_ns, message.linear.x, message.angular.z)
+
+    def _flows(self) -> bool:
+        """Return whether commands reach the physical robot, as far as can be told: it is heard.
+
+        What does not reach it is kept from the virtual one, too; without a physical one, that is commanded.
+        """
+        return self.heard_ns is None or self.node.now_ns - self.heard_ns < LabelConfig.fresh_s * 1e9
 
     def _own_commands(self) -> set[bytes]:
         """Return who commands the physical robot from this process."""
