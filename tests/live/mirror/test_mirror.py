@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import csv
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -136,3 +137,27 @@ def test_a_bag_of_a_mirror_is_mirrored_again(
 def test_no_bag_is_refused_in_a_sentence(scenario: Scenario) -> None:
     with pytest.raises(RecordingError, match="none: cannot be read"):
         Followed(scenario, Path("none"))
+
+
+def test_what_is_in_its_way_but_not_in_that_of_the_physical_robot_is_told_and_let_through(
+    scenario: Scenario, recorded: Path
+) -> None:
+    truth = truths(recorded)
+    there = truth[len(truth) // 3][1]
+    box = {"name": "box", "pose": {"x": there.x, "y": there.y}, "size": [0.1, 0.1, 0.3]}
+    blocked = load("diff_bot_figure8", {"world.obstacles": json.dumps([box])})
+    followed = Followed(blocked, recorded / "bag")
+    assert [event.what for event in followed.events] == ["model"]
+    assert "box is in the way, but not in that of the physical robot" in followed.events[0].text
+    assert max(position for position, _ in errors(followed.poses, truth)) < 0.1
+
+
+def test_what_walks_in_the_scenario_does_not_walk_in_a_mirror(recorded: Path) -> None:
+    walker = {"name": "walker", "pose": {"x": 3.0}, "size": [0.4, 0.4, 1.0], "route": [[3.0, 3.0]]}
+    box = {"name": "box", "pose": {"x": 5.0}, "size": [0.4, 0.4, 1.0]}
+    followed = Followed(
+        load("diff_bot_figure8", {"world.obstacles": json.dumps([walker, box])}), recorded / "bag"
+    )
+    names = {body.name for body in (*followed.world.scene.statics, *followed.world.scene.placed)}
+    assert "box" in names
+    assert "walker" not in names

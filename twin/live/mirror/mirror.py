@@ -51,7 +51,14 @@ class Mirror:
         Raises:
             TwinError: A robot cannot be made, or nobody can be reached.
         """
-        changes: dict[str, object] = {"faults": (), "early_stop": "never", "duration": _FOR_EVER_S}
+        # When something comes or walks is not known of a world that is.
+        still = [box for box in scenario.world.obstacles if box.route is None and box.appears_within is None]
+        changes: dict[str, object] = {
+            "world": scenario.world.model_copy(update={"obstacles": tuple(still)}),
+            "faults": (),
+            "early_stop": "never",
+            "duration": _FOR_EVER_S,
+        }
         self.source, self.clock = source, FollowedClock(source.start_ns)
         with ExitStack() as ending:
             ending.callback(source.close)

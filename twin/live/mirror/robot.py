@@ -26,6 +26,10 @@ from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World
 
 _PENDING = 200
+_STUCK = 0.06
+"""A virtual robot that is so far from the physical one [m], and touches something, may be held by it ..."""
+_STUCK_TICKS = 5
+"""... and is if it does for so long."""
 _WORLD = "map"
 COMMANDED = "commanded"
 """Topic, in the virtual robot's namespace, of what autonomy here commands if a guard is to pass it on."""
@@ -79,6 +83,8 @@ class MirroredRobot:
             context.layout.autonomy != "none" and localisation is not None and localisation.type != "none"
         )
         self._pending: deque[tuple[int, Pose2]] = deque(maxlen=_PENDING)
+        self._stuck: dict[str, int] = {}
+        """For how many ticks the virtual robot has touched what, while it was left behind."""
         self._latest_ns = -1
         self._physical: Pose2 | None = None
         self._joints: dict[str, float] = {}
@@ -100,7 +106,8 @@ class MirroredRobot:
             node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
         self._series = {
-            name: node.create_publisher(Float64, f"divergence/{name}", 10) for name in ("position", "yaw")
+            name: node.create_publisher(Float64, f"divergence/{name}", 10)
+            for name in ("position", "yaw", "prediction")
         }
         node.create_task(self._run())
 
@@ -152,6 +159,8 @@ class MirroredRobot:
         moved = self.follower.step(virtual, elapsed_s)
         if self.follower.resets > resets:
             self.tell("reset", f"put {virtual.distance(moved):.2f} m away, where the physical robot is")
+            self.stack.handle.carry(self.stack.standing(virtual))
+        self._let_through()
         motion = moved @ virtual.inverse()
         if motion.distance(Pose2(0.0, 0.0, 0.0)) > 0.0 or motion.yaw != 0.0:
             world.shift(base, motion)
@@ -162,6 +171,21 @@ class MirroredRobot:
             self.stack.handle.hardware.command(joint, position)
         self._pose.publish(pose_stamped(moved, _WORLD, now_ns))
 
+    def _let_through(self) -> None:
+        """Take away what stops the virtual robot where the physical one goes on."""
+        if self.difference is None or self.difference.position < _STUCK:
+            self._stuck.clear()
+            return
+        robot, goods = f"{self.stack.name}/", {good.name for good in self._world.scene.goods}
+        for contact in self._world.contacts():
+            if not contact.body1.startswith(robot) or contact.body2 in goods:
+                continue
+            self._stuck[contact.body2] = self._stuck.get(contact.body2, 0) + 1
+            if self._stuck[contact.body2] == _STUCK_TICKS:
+                self.tell("model", f"{contact.body2} is in the way, but not in that of the physical robot")
+            if self._stuck[contact.body2] >= _STUCK_TICKS:
+                self._world.alterations.let_through(solid for _, solid in contact.geoms)
+
     def _measure(self, stamp_ns: int, physical: Pose2) -> None:
         difference = self.follower.measured(stamp_ns, physical)
         if difference is None:
@@ -169,6 +193,7 @@ class MirroredRobot:
         self.difference, self._physical = difference, physical
         self._series["position"].publish(Float64(data=difference.position))
         self._series["yaw"].publish(Float64(data=difference.yaw))
+        self._series["prediction"].publish(Float64(data=difference.prediction))
 
     def _on_tf(self, message: TFMessage) -> None:
         frames = self.stack.frames
