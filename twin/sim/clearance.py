@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 FARTHEST = 5.0
 """What is farther away is not looked for [m]."""
-_AT_ONCE = 16
-"""Shapes of the surroundings, nearest first."""
 
 
 class ClearanceMeter:
@@ -35,6 +33,7 @@ class ClearanceMeter:
             robot: (np.flatnonzero(solid & (of == robot)), np.flatnonzero(solid & (of != robot)))
             for robot in world.robots
         }
+        self._nearest: dict[str, tuple[int, int]] = {}
 
     def clearance(self, robot: str) -> float:
         """Return the distance of a robot's shapes from what is neither itself nor the floor [m].
@@ -42,36 +41,38 @@ class ClearanceMeter:
         Negative where they overlap; `FARTHEST` if nothing is nearer.
         """
         own, others = self._pairs[robot]
-        # A sphere around the whole robot leaves few of the hall's shapes to be looked at one by one.
+        # The pair that was nearest is near still; so few of the others are to be looked at one by one.
+        nearest = self._distance(*self._nearest[robot]) if robot in self._nearest else FARTHEST
         centres, radii = self._data.geom_xpos[own], self._model.geom_rbound[own]
-        middle = centres.mean(axis=0)
-        reach = np.max(np.linalg.norm(centres - middle, axis=1) + radii)
-        around = self._at_least(middle[None], np.array([reach]), others)[0]
-        order = np.argsort(around, kind="stable")
-        nearest = FARTHEST
-        for begin in range(0, len(order), _AT_ONCE):
-            some = order[begin : begin + _AT_ONCE]
-            if around[some[0]] >= nearest:
+        middle = centres.sum(axis=0) / max(len(own), 1)
+        offsets = centres - middle
+        reach = np.max(np.sqrt(np.einsum("ni,ni->n", offsets, offsets)) + radii, initial=0.0, keepdims=True)
+        some = others[self._at_least(middle, reach, others)[:, 0] < nearest]
+        least = self._at_least(centres, radii, some)
+        rows, columns = np.nonzero(least < nearest)
+        pairs = zip(least[rows, columns].tolist(), own[columns].tolist(), some[rows].tolist(), strict=True)
+        for bound, one, other in sorted(pairs):
+            if bound >= nearest:
                 break
-            least = self._at_least(centres, radii, others[some])
-            for pair in np.argsort(least, axis=None, kind="stable"):
-                i, j = divmod(int(pair), len(some))
-                if least[i, j] >= nearest:
-                    break
-                shapes = int(own[i]), int(others[some[j]])
-                distance = mujoco.mj_geomDistance(self._model, self._data, *shapes, nearest, None)
-                nearest = min(nearest, distance)
-        return float(nearest)
+            distance = self._distance(one, other)
+            if distance < nearest:
+                nearest, self._nearest[robot] = distance, (one, other)
+        return nearest
+
+    def _distance(self, one: int, other: int) -> float:
+        return mujoco.mj_geomDistance(self._model, self._data, one, other, FARTHEST, None)
 
     def _at_least(self, centres: Array, radii: Array, others: NDArray[np.intp]) -> Array:
         """Return lower bounds of the distances of spheres, shapes (n, 3) and (n,), from the boxes of shapes.
 
-        Shape (n, m) [m].
+        Shape (m, n) [m].
         """
         model, data = self._model, self._data
-        offsets = centres[:, None] - data.geom_xpos[others]
-        local = np.einsum("nmi,mij->nmj", offsets, data.geom_xmat[others].reshape(-1, 3, 3))
-        boxes = model.geom_aabb[others]
-        outside = np.maximum(np.abs(local - boxes[:, :3]) - boxes[:, 3:], 0.0)
-        bounds: Array = np.sqrt(np.einsum("nmi,nmi->nm", outside, outside)) - radii[:, None]
+        boxes = model.geom_aabb[others, None]
+        outside = (centres - data.geom_xpos[others, None]) @ data.geom_xmat[others].reshape(-1, 3, 3)
+        outside -= boxes[..., :3]
+        np.abs(outside, out=outside)
+        outside -= boxes[..., 3:]
+        np.maximum(outside, 0.0, out=outside)
+        bounds: Array = np.sqrt(np.einsum("mni,mni->mn", outside, outside)) - radii
         return bounds
