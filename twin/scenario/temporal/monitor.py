@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from twin.scenario.temporal import formula as stl
@@ -105,7 +104,7 @@ class _And(_Node):
         for part in self._parts:
             part.work()
         self.known = min([part.known for part in self._parts])
-        for begin in _changes(self._parts, self._now, self.known):
+        while (begin := _take_next(self._parts, self._now, self.known)) < FOREVER:
             self._found(begin, lowest(self._now))
 
     def _so_far(self) -> tuple[Margin, Margin]:
@@ -194,7 +193,7 @@ class _Until(_Node):
         for part in self._parts:
             part.work()
         until = min([part.known for part in self._parts])
-        for begin in _changes(self._parts, self._now, until):
+        while (begin := _take_next(self._parts, self._now, until)) < FOREVER:
             self._advance(begin)
             self._meet(*self._now)
         self._advance(until)
@@ -321,16 +320,18 @@ class Monitor:
         return _And([made, before])
 
 
-def _changes(nodes: list[_Node], now: list[Margin], known: int) -> Iterator[int]:
-    """Take what all nodes know; yield when one changes, with the margins from then on in `now`."""
-    while True:
-        begin = min([node.changes[0][0] for node in nodes if node.changes], default=FOREVER)
-        if begin >= known:
-            return
-        for i, node in enumerate(nodes):
-            if node.changes and node.changes[0][0] == begin:
-                now[i] = node.changes.popleft()[1]
-        yield begin
+def _take_next(nodes: list[_Node], now: list[Margin], known: int) -> int:
+    """Take the next change into `now`; return its moment, FOREVER if not all nodes know of one."""
+    begin = known
+    for node in nodes:
+        if node.changes and node.changes[0][0] < begin:
+            begin = node.changes[0][0]
+    if begin >= known:
+        return FOREVER
+    for i, node in enumerate(nodes):
+        if node.changes and node.changes[0][0] == begin:
+            now[i] = node.changes.popleft()[1]
+    return begin
 
 
 def _is_last(until: int, part: _Node) -> bool:
