@@ -22,6 +22,7 @@ from twin.live.mirror.label import Evidence, LabelConfig, judge
 from twin.live.mirror.obedience import Obedience
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status
+from twin.live.mirror.told import Told
 from twin.nodes.messages import pose_stamped
 from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World
@@ -41,7 +42,7 @@ COMMANDED = "commanded"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
+class Event:
     """Something that happened, for whoever watches."""
 
     stamp_ns: int
@@ -80,7 +81,7 @@ class MirroredRobot:
         """The latest, before it was corrected."""
         self.heard_ns: int | None = None
         """When the latest data came, by the robot's clock."""
-        self.events: list[Told] = []
+        self.events: list[Event] = []
         self._world, self._held = world, held
         self._stepped_ns: int | None = None
         localisation = context.config.localisation
@@ -113,6 +114,7 @@ class MirroredRobot:
         if guard is not None:
             self.guard = GuardClient(node, guard=f"{space}/{guard}", monotonic_ns=time.perf_counter_ns)
             node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
+        self.told = Told(node, space)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
         self._series = {
             name: node.create_publisher(Float64, f"divergence/{name}", 10)
@@ -141,7 +143,9 @@ class MirroredRobot:
             virtual=self._world.pose(self.stack.handle.base).to_pose2(),
             physical=self._physical,
             clock_offset_s=source.clock_offset_s,
+            delay_s=self.told.delay_s,
             resets=self.follower.resets,
+            told=dict(self.told.words),
         )
 
     def forget(self) -> None:
@@ -236,6 +240,7 @@ class MirroredRobot:
             if stamp_ns <= self._latest_ns:
                 continue  # repeated, or overtaken
             self._latest_ns = stamp_ns
+            self.told.late((self.node.now_ns - stamp_ns) * 1e-9)
             T_world_odom = self._T_world_odom()
             if T_world_odom is not None:
                 self._pending.append((stamp_ns, T_world_odom @ pose))
@@ -297,7 +302,7 @@ class MirroredRobot:
 
     def tell(self, what: str, text: str) -> None:
         """Note an event, and log it."""
-        self.events.append(Told(stamp_ns=self.node.now_ns, what=what, text=text))
+        self.events.append(Event(stamp_ns=self.node.now_ns, what=what, text=text))
         self.node.get_logger().warn(f"{what}: {text}")
 
 
