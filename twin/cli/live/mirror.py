@@ -72,6 +72,9 @@ def mirror(
         return
     if scenario is None:
         raise typer.BadParameter("a scenario, or --status", param_hint="SCENARIO")
+    if bag is not None and (autonomy == "all" or guard is not None):
+        said = "a bag obeys no commands; valid with --bag: --autonomy none or localisation, no --guard"
+        raise typer.BadParameter(said)
     from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.wire.interrupts import noted_signals
     from twin.cli.run.options import parse_overrides
