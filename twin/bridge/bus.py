@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from twin.bridge.actions.client import ActionClient, ClientGoal
 
 _EXTERNAL_DEPTH = 10_000
+_left: list[Any] = []
+"""What Zenoh made in the process of which this one is a fork."""
 
 Tap = Callable[[Sample[Any]], None]
 
@@ -275,6 +277,23 @@ class Bus:
         """Call back for every sample that this process publishes, while it publishes it."""
         self.taps.append(callback)
 
+    def go_alone(self) -> None:
+        """Be, in a fork, a bus without a network: what Zenoh made is kept, and never touched again.
+
+        Its threads are not there, one of its locks may be held for ever, and who ends what it made talks to
+        others with the voice of the process that was forked. Messages and requests on their way between own
+        nodes arrive; what others have said and nobody has admitted was never said.
+        """
+        self.external.forked()
+        self.arrival_taps.clear()
+        if not (self.networked or self.wire.is_open):
+            return
+        _left.append((self.wire, self._starting, getattr(self, "_bridge", None)))
+        self.networked, self._starting = False, None
+        self.wire = LateSession(_no_session)
+        self.in_process.is_private = True
+        _left.extend(node.go_alone() for node in self.nodes)
+
     def close(self) -> None:
         """Destroy the nodes and leave the network. Harmless when repeated."""
         if self._closed:
@@ -316,3 +335,7 @@ class Bus:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _no_session() -> zenoh.Session:
+    raise BridgeError("a fork of a run has no network")

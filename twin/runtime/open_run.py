@@ -42,6 +42,8 @@ _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
 _LIVE_S = 0.2
 """A viewer is as much behind the run, at most."""
+_left: list[object] = []
+"""What belongs to the process of which this one is a fork."""
 _SHOWN_S = 0.25
 """Between two calls of a progress bar, by the clock on the wall."""
 
@@ -122,6 +124,8 @@ class OpenRun:
         self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
+        self.between_ticks: list[Callable[[], None]] = []
+        """Called after each tick of `advance`."""
         self._thought = False
         """Whether a tick is under way, at an agent's place."""
         bag_tap = None
@@ -129,7 +133,7 @@ class OpenRun:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        taps = [*taps, *(tap.on_sample for tap in (self._sink, bag_tap) if tap is not None)]
+        taps = self._observers = [*taps, *(tap.on_sample for tap in (self._sink, bag_tap) if tap is not None)]
         network = network or SessionConfig(listen=outside.endpoints(listen))
         # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
         needed = pace is not None or network.networked or workers > 0
@@ -191,6 +195,8 @@ class OpenRun:
                 run.tick()
                 if run.world.time_ns >= self.digest.second_ends_ns:
                     self.digest.end_second(run.world.state_digest())
+                for each in self.between_ticks:
+                    each()
                 if until is not None and until():
                     return True
                 if self._pace is not None:
@@ -257,6 +263,19 @@ class OpenRun:
             self.advance(None if watch is None else lambda: watch(run), progress)
         finally:
             gc.unfreeze()
+
+    def go_alone(self) -> None:
+        """Go on in a fork of the process, between two ticks: heard by nobody, and as fast as possible.
+
+        Its digest goes on, too. What the run leaves, and what observes it, stays with the other process; it
+        is kept here, so that nothing is ended twice.
+        """
+        self.run.go_alone()
+        bus = self.run.bus
+        bus.taps[:] = [tap for tap in bus.taps if tap not in self._observers]
+        _left.append((self._ending.pop_all(), self._sink, self._observers))
+        self._sink = self._pace = self._out = None
+        self.between_ticks = []
 
     def finish(self) -> Verdict:
         """Judge the run as it stands, write what it leaves, and close it.
