@@ -48,6 +48,8 @@ class Bus:
     """
 
     def __init__(self, config: SessionConfig, clock: Clock, naming: Naming, savings: Savings = ALL) -> None:
+        self.session_name = config.name
+        """What its ids depend on; empty: nothing, they are random."""
         self.networked = networked = config.networked
         """Whether other processes may take part."""
         self.wire = LateSession(partial(open_session, config))

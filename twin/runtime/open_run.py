@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from twin.bridge.cdr.codec import codec
 from twin.bridge.topics import Sample
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
@@ -264,6 +266,17 @@ class OpenRun:
         finally:
             gc.unfreeze()
 
+    def show(self, topic: str, message: Any) -> None:
+        """Draw a message that no node has published, if there is a recording."""
+        if self._sink is not None:
+            name, now_ns = codec(type(message)).msgtype, self.run.world.time_ns
+            sample: Any = SimpleNamespace(topic=topic, msgtype=name, time_ns=now_ns, message=message)
+            self._sink.on_sample(sample)
+
+    def on_close(self, callback: Callable[[], None]) -> None:
+        """Call back when the run is closed, while all of it is there."""
+        self._ending.callback(callback)
+
     def go_alone(self) -> None:
         """Go on in a fork of the process, between two ticks: heard by nobody, and as fast as possible.
 
@@ -298,20 +311,24 @@ class OpenRun:
 
     def kept(self) -> KeptRun:
         """Return what other runs are compared with, and of what this one is made again; at its end."""
-        source = self.run.scenario.source
         return KeptRun(
-            provenance=Provenance(
-                file=str(source.file),
-                scenario=source.data,
-                nodes=self._outside.nodes,
-                clock=self._outside.clock(self.run.bus.networked),
-                files=source.files(),
-                plugins=self._executed.versions,
-                versions=versions(),
-                cpu=cpu_class(),
-            ),
+            provenance=self.provenance(),
             digest=self._finished,
             hashes=self.digest.hashes(self.run.world.state_digest()),
+        )
+
+    def provenance(self) -> Provenance:
+        """Return with what the run is made."""
+        source = self.run.scenario.source
+        return Provenance(
+            file=str(source.file),
+            scenario=source.data,
+            nodes=self._outside.nodes,
+            clock=self._outside.clock(self.run.bus.networked),
+            files=source.files(),
+            plugins=self._executed.versions,
+            versions=versions(),
+            cpu=cpu_class(),
         )
 
     def _verdict(self) -> Verdict:

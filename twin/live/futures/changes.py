@@ -10,6 +10,8 @@ from twin.bridge.action_types import NavigateToPose
 from twin.bridge.actions import ActionClient
 from twin.bridge.actions.client import ClientGoal
 from twin.bridge.node.options import BARE
+from twin.bridge.services import Client
+from twin.bridge.srvs import CancelGoal
 from twin.bridge.types.default_values import new
 from twin.errors import SimulationError, nearest
 from twin.geometry import Pose2
@@ -47,9 +49,13 @@ def send(run: Run, stack: RobotStack, goal: Pose2) -> ClientGoal:
     """
     if stack.navigator is None:
         raise SimulationError(f"--goal: robot '{stack.name}' does not navigate; it has no `navigation`")
-    for node in run.parts.deciders:
-        node.destroy()
+    clients = [e for decider in run.parts.deciders for e in decider.endpoints if isinstance(e, Client)]
+    cancels = {client.name: None for client in clients if client.name.endswith("/_action/cancel_goal")}
+    for decider in run.parts.deciders:
+        decider.destroy()
     node = run.bus.create_node("what_if", stack.context.namespace, options=BARE)
+    for name in cancels:  # all goals: nobody waits for their ends any more
+        node.create_client(CancelGoal, name).call_async(new(CancelGoal.Request))
     client = ActionClient(node, NavigateToPose, "navigate_to_pose")
     frame = stack.navigator.frame
     return client.send_goal(new(NavigateToPose.Goal, pose=pose_stamped(goal, frame, run.bus.clock.now_ns)))
