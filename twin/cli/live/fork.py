@@ -12,6 +12,9 @@ from twin.cli.option_groups import AsJson
 from twin.cli.ros.joining import Joining, joins
 from twin.errors import BridgeError, SimulationError
 
+_WAIT_S = 3.0
+"""For a run that is there."""
+
 if TYPE_CHECKING:
     from twin.bridge.live import LiveBus
     from twin.live.futures.futures import Answer
@@ -130,17 +133,15 @@ def _find(process: LiveBus) -> None:
         ) from None
 
 
-_WAIT_S = 3.0
-
-
 def _trigger(process: LiveBus, service: str) -> str:
     """Return the message of an answer; raises SimulationError if it is a refusal."""
     from twin.bridge.srvs import Trigger
     from twin.cli.ros.joining import tool_node
-    from twin.cli.ros.service.call import answer, wait_for_service
+    from twin.cli.ros.service.call import answer
 
     client = tool_node(process.bus, "fork").create_client(Trigger, service)
-    wait_for_service(process, client, Trigger.name, _WAIT_S)
+    if not process.spin(lambda: client.service_is_ready, _WAIT_S):
+        raise SimulationError(f"{service} is announced, but cannot be reached")
     response: Any = answer(process, client, Trigger.Request())
     if not response.success:
         raise SimulationError(response.message)
