@@ -74,7 +74,7 @@ def test_it_is_made_again_bit_for_bit(driven: tuple[OpenRun, Inputs], tmp_path: 
 
 def replace_payload(one):  # type: ignore[no-untyped-def]
     message = new(Twist)
-    message.angular.z = -2.0
+    message.angular.z = 1.0  # instead of -1.0
     from twin.bridge.cdr.codec import codec
 
     return one._replace(payload=codec(Twist).encode(message))
