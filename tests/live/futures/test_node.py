@@ -52,6 +52,22 @@ def test_it_answers_while_the_run_goes_on(begin: Begin) -> None:
     assert digest(run) == digest(alone), "that somebody asks is no part of the run"
 
 
+def test_their_paths_are_in_the_recording(begin: Begin, tmp_path: Path) -> None:
+    from twin.recording.read_back import read
+
+    run = OpenRun(begin(0.0).run.scenario, out=tmp_path / "out")
+    try:
+        node = FuturesNode(run).node
+        node.set_parameter("n", 2)
+        node.set_parameter("horizon", 0.2)
+        assert asked(run).success
+        run.finish()
+    finally:
+        run.close()
+    entities = read(tmp_path / "out" / "there_and_back.rrd").entities
+    assert {"/ros/futures/path_1", "/ros/futures/path_2"} <= set(entities)
+
+
 def test_it_refuses_in_a_sentence(begin: Begin) -> None:
     run = begin(0.0, duration="10000 s", drive="9000 s")
     node = FuturesNode(run).node

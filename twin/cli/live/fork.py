@@ -31,7 +31,7 @@ def fork(
     horizon: Annotated[float, typer.Option(metavar="S", help="How far they go at most.")] = 60.0,
     goal: Annotated[
         str | None,
-        typer.Option(metavar="X,Y,YAW", help="Send the robot there [m, m, rad], instead of what it is at."),
+        typer.Option(metavar="X,Y,YAW", help="Send the robot there (m, m, rad), instead of what it is at."),
     ] = None,
     set: Annotated[
         list[str] | None,
