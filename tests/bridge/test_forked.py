@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 
+import pytest
+
 from twin.bridge import live
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
@@ -14,7 +16,7 @@ from twin.bridge.services import Respond
 from twin.bridge.srvs import Trigger
 
 
-def test_what_is_under_way_between_own_nodes_arrives(endpoint: str) -> None:
+def test_what_is_under_way_between_own_nodes_arrives(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock()
     with Bus.open(clock, listen=(endpoint,)) as bus, live.join((endpoint,)) as outside:
         node = bus.create_node("one")
@@ -49,6 +51,10 @@ def test_what_is_under_way_between_own_nodes_arrives(endpoint: str) -> None:
             told = {}
             try:
                 bus.go_alone()
+                monkeypatch.setattr(
+                    "twin.bridge.services.questions.pack_attachment", None
+                )  # a reply over Zenoh
+                monkeypatch.setattr("twin.bridge.topics.pack_attachment", None)  # a message over Zenoh
                 late: list[str] = []
                 bus.create_node("late").create_subscription(
                     String, "latched", lambda m: late.append(m.data), LATCHED

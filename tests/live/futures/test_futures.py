@@ -16,6 +16,7 @@ from twin.errors import TwinError
 from twin.live.futures import Futures, WhatIf
 from twin.live.futures.futures import Answer
 from twin.runtime.open_run import OpenRun
+from twin.scenario.schema import load
 
 
 def answer(
@@ -130,6 +131,12 @@ def test_a_bug_in_a_node_is_that_future_s_end(begin: Begin) -> None:
     assert answer(run, n=1, horizon=3.0).outcomes[0].reason.startswith("ZeroDivisionError")
 
 
+def test_who_observes_the_run_is_told_nothing_of_futures(begin: Begin) -> None:
+    parent = os.getpid()
+    run = begin(0.1, taps=[lambda sample: os.getpid() == parent or os._exit(3)])
+    assert answer(run, n=1, horizon=0.2).outcomes[0].end == "under way"
+
+
 def test_all_end_with_who_asked(begin: Begin) -> None:
     run = begin(0.1)
     parent, node = os.getpid(), run.run.bus.create_node("sleeper")
@@ -196,3 +203,41 @@ def test_a_recording_goes_on_as_if_nothing_had_happened(begin: Begin, tmp_path: 
             run.close()
         contents.append(content_digest(out / "there_and_back.rrd"))
     assert contents[0] == contents[1]
+
+
+NAVIGATES = """
+name: navigates
+seed: 1
+duration: 100 s
+world: {arena: warehouse}
+robots: [{model: warehouse_bot, start: start, localisation: {type: amcl, map: warehouse}, navigation: {}}]
+mission:
+  type: behaviors
+  robot: warehouse_bot
+  steps: [{navigate_to_pose: {x: -7.2 m, y: -5.4 m}}, {wait: {duration: 90 s}}]
+checks: [{no_collision: }]
+"""
+
+
+def test_in_the_middle_of_a_goal(tmp_path: Path, endpoint: str) -> None:
+    file = tmp_path / "navigates.yaml"
+    file.write_text(NAVIGATES, encoding="utf-8")
+    run = OpenRun(load(file), record=False, network=listening(endpoint))
+    try:
+        go_on(run, 1.0)
+        told = answer(run, n=2)
+        assert told.awaited == "the goal under way"
+        assert told.succeeded == 2
+        first, other = told.outcomes
+        assert first.digest != other.digest
+        go_on(run, 1.0 + first.end_s)
+        assert digest(run) == first.digest, "filters, trees and controllers go on as they were"
+        go_on(run, 4.0)
+        assert answer(run, n=1, horizon=0.1).awaited == "the end of the mission"
+        (there,) = answer(run, n=1, goal=(-6.5, -5.4, 0.0)).outcomes
+        assert there.end == "arrived", "and nothing of the mission holds it back"
+        assert there.path[-1][1:3] == pytest.approx((-6.5, -5.4), abs=0.3)
+        (nowhere,) = answer(run, n=1, goal=(-50.0, -5.4, 0.0)).outcomes
+        assert (nowhere.end, nowhere.reason) == ("failed", "(-50.00, -5.40) is outside the costmap")
+    finally:
+        run.close()

@@ -55,7 +55,8 @@ def test_it_answers_while_the_run_goes_on(begin: Begin) -> None:
 def test_their_paths_are_in_the_recording(begin: Begin, tmp_path: Path) -> None:
     from twin.recording.read_back import read
 
-    run = OpenRun(begin(0.0).run.scenario, out=tmp_path / "out")
+    scenario = begin(0.0, duration="10000 s", drive="9000 s").run.scenario
+    run = OpenRun(scenario, out=tmp_path / "out")
     try:
         node = FuturesNode(run).node
         node.set_parameter("n", 2)

@@ -153,7 +153,7 @@ def _report(answer: Answer) -> list[str]:
 
     lines = [f"{'future':>6}  {'end':<9}  {'after':>7}  {'clearance':>9}"]
     for one in answer.outcomes:
-        clearance = "" if one.clearance_m is None else f"{one.clearance_m:.3f} m"
+        clearance = "" if one.clearance_m is None else f"{one.clearance_m:z.3f} m"
         why = "; ".join(filter(None, (", ".join(one.failed_checks), one.reason)))
         lines.append(f"{one.number:>6}  {one.end:<9}  {one.end_s:>5.2f} s  {clearance:>9}  {why}".rstrip())
     arrivals = [one.arrival_s for one in answer.outcomes if one.arrival_s is not None]

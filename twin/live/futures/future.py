@@ -101,7 +101,7 @@ def live(run: OpenRun, stack: RobotStack, awaited: Awaited, number: int, horizon
     elapsed_s = round((world.time_ns - begin_ns) * 1e-9, 3)
     return Outcome(
         number=number,
-        end=end,
+        end="failed" if failed else end,
         reason=awaited.reason if end == "failed" else "; ".join(c.result().reason for c in failed),
         arrival_s=elapsed_s if end == "arrived" else None,
         end_s=elapsed_s,

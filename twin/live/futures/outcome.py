@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, Self
 
 End = Literal["arrived", "failed", "under way", "lost"]
-"""`under way`: neither arrived nor failed when it ended; `lost`: its process died or took too long."""
+"""`failed`: the goal, the mission or a check; `under way`: neither arrived nor failed when it ended; `lost`:
+its process died or took too long."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +21,7 @@ class Outcome:
     reason: str = ""
     """Why it failed, or was lost."""
     arrival_s: float | None = None
-    """From the fork to the goal, or to the end of the mission [s]."""
+    """From the fork to the goal, or to the end of the mission [s]; None: not reached."""
     end_s: float = 0.0
     """From the fork to where this future ends [s]."""
     clearance_m: float | None = None
@@ -36,7 +37,7 @@ class Outcome:
     @property
     def succeeded(self) -> bool | None:
         """Whether it arrived in time without a failed check; None: that is not known."""
-        return None if self.end == "lost" else self.end == "arrived" and not self.failed_checks
+        return None if self.end == "lost" else self.end == "arrived"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
