@@ -18,6 +18,8 @@ from twin.bridge.graph import starting_key
 from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
+from twin.bridge.services import Service
+from twin.bridge.services.questions import ZenohQuestion
 from twin.bridge.topics import Endpoint, Sample, Subscription
 from twin.bridge.topics.in_process import InProcess, Member
 from twin.bridge.topics.link import Carried, Link
@@ -228,12 +230,16 @@ class Bus:
             receiver = arrival.receiver
             if self.link is not None and isinstance(receiver, Subscription):
                 heard = Carried(receiver.name, "", arrival.source.sequence, receiver.is_latched, True)
-                self.link.carry(heard, partial(self._enter, arrival))
+                self.link.carry(heard, partial(self.enter, arrival))
+            elif self.link is not None and isinstance(receiver, Service):
+                asked = Carried(receiver.name, "", arrival.source.sequence, False, True)
+                self.link.carry_call(asked, partial(self.enter, arrival))
             else:
-                self._enter(arrival)
+                self.enter(arrival)
         return len(arrivals)
 
-    def _enter(self, arrival: Arrival) -> None:
+    def enter(self, arrival: Arrival) -> None:
+        """Put what came from outside into its inbox."""
         for tap in self.arrival_taps:
             tap(arrival)
         arrival.receiver.enqueue(arrival.data, True)
@@ -290,6 +296,7 @@ class Bus:
         self.arrival_taps.clear()
         if not (self.networked or self.wire.is_open):
             return
+        ZenohQuestion.is_reachable = False
         _left.append((self.wire, self._starting, getattr(self, "_bridge", None)))
         self.networked, self._starting = False, None
         self.wire = LateSession(_no_session)

@@ -89,6 +89,7 @@ class OpenRun:
         viewer: str | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
+        shown: Callable[[RerunSink], Callable[[Sample[Any]], None]] = lambda sink: sink.on_sample,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -113,6 +114,7 @@ class OpenRun:
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
+            shown: Returns what passes samples on to the recording.
 
         Raises:
             TwinError: The run cannot be made.
@@ -136,7 +138,9 @@ class OpenRun:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        taps = self._observers = [*taps, *(tap.on_sample for tap in (self._sink, bag_tap) if tap is not None)]
+        taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
+        taps += [] if bag_tap is None else [bag_tap.on_sample]
+        self._observers = taps
         network = network or SessionConfig(listen=outside.endpoints(listen))
         # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
         needed = pace is not None or network.networked or workers > 0

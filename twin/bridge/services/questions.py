@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import zenoh
 
@@ -29,6 +29,9 @@ class Question(Protocol):
 class ZenohQuestion:
     """A request that came through Zenoh, from anywhere."""
 
+    is_reachable: ClassVar[bool] = True
+    """Whether answers reach anybody; in a fork they do not, be it that a link still carries one."""
+
     def __init__(self, query: zenoh.Query, source: Attachment) -> None:
         self.query = query
         self.source = source
@@ -44,6 +47,7 @@ class ZenohQuestion:
         """Answer at a time [ns] with a response as CDR."""
         if self._answer is not None:
             self._answer(payload)
+        if self._answer is not None or not self.is_reachable:
             return
         query, source = self.query, self.source
         typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
@@ -55,6 +59,7 @@ class ZenohQuestion:
         """Answer never."""
         if self._answer is not None:
             self._answer(None)
+        if self._answer is not None or not self.is_reachable:
             return
         self.query.drop()  # type: ignore[no-untyped-call]
 

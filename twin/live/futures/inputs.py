@@ -91,7 +91,7 @@ def feed(run: OpenRun, inputs: Sequence[Input]) -> Callable[[], None]:
     def put() -> None:
         nonlocal following
         while following is not None and following.time_ns <= world.time_ns:
-            bus.external.push(_arrival(bus, following))
+            bus.enter(_arrival(bus, following))
             following = next(waiting, None)
 
     return put
