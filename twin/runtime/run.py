@@ -93,6 +93,23 @@ class Run:
         self.workers = Workers(self, count)
         return self.workers
 
+    def add_faults(self, scenario: Scenario) -> None:
+        """Take a scenario that is this one with more faults, behind those it has; they are due by its keys.
+
+        Raises:
+            ScenarioError: The run lacks what is to fail.
+        """
+        self.scenario = scenario
+        if self.faults is None:
+            self.faults = self._schedule_faults()
+        else:
+            self.faults.extend(scenario)
+
+    def go_alone(self) -> None:
+        """Go on in a fork, heard by nobody: no network, no recording."""
+        self._sink, self.world.crash_folder = None, None
+        self.bus.go_alone()
+
     def _schedule_faults(self) -> FaultSchedule:
         """Prepare the faults, and let those happen that are there from the start."""
         from twin.faults.fault import FaultContext
