@@ -43,6 +43,9 @@ def mirror(
         Path | None,
         typer.Option(metavar="BAG", help="Follow the robots of a bag instead, as fast as can be."),
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Write a recording there, for `twin play`.")
+    ] = None,
     record: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write a bag of all that is heard and said.")
     ] = None,
@@ -74,7 +77,7 @@ def mirror(
     described = load(scenario, parse_overrides(set or (), seed), execute=True)
     with (
         Mirror(
-            described, _source(bag, connect, domain), autonomy=autonomy, guard=guard, bag=record
+            described, _source(bag, connect, domain), autonomy=autonomy, guard=guard, out=out, bag=record
         ) as robots,
         noted_signals() as received,
         _shown(robots) as show,
