@@ -173,7 +173,10 @@ class OpenRun:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
                 self._sink.declare(parts.world, wheels)
-            self._pace = Pace(pace) if isinstance(pace, int | float) else pace
+            self._pace = kept = Pace(pace) if isinstance(pace, int | float) else pace
+            if kept is not None:
+                world = parts.world
+                self.run.wait = lambda: kept.keep(world.time_ns * 1e-9)
             self._ending = ending.pop_all()
             if out is not None:
                 self._ending.callback(lambda: self.kept().write(out))
@@ -212,8 +215,6 @@ class OpenRun:
                     each()
                 if until is not None and until():
                     return True
-                if self._pace is not None:
-                    self._pace.keep(run.world.time_ns * 1e-9)
                 if progress is not None and time.perf_counter() - shown > _SHOWN_S:
                     shown = time.perf_counter()
                     simulated = run.world.time_ns * 1e-9
@@ -245,8 +246,6 @@ class OpenRun:
                 if self._thought:
                     run.act()
                     self._thought = False
-                    if self._pace is not None:
-                        self._pace.keep(run.world.time_ns * 1e-9)
                 if run.over:
                     return False
                 run.think()
@@ -299,6 +298,7 @@ class OpenRun:
         bus.taps[:] = [tap for tap in bus.taps if tap not in self._observers]
         _left.append((self._ending.pop_all(), self._sink, self._observers))
         self._sink = self._pace = self._out = None
+        self.run.wait = lambda: None
         self.between_ticks = []
 
     def finish(self) -> Verdict:

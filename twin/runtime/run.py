@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge.msgs import Clock as ClockMsg
@@ -75,6 +76,8 @@ class Run:
         self._end_ns = round(scenario.duration * 1e9)
         """When the run ends, at the latest."""
         self._mission_end_ns: int | None = None
+        self.wait: Callable[[], None] = lambda: None
+        """Returns when the world's time has come, if the run keeps to a pace."""
         self._check()  # where everything starts
 
     @property
@@ -182,7 +185,8 @@ class Run:
         world.step(end - world.step_count)
 
     def sense(self) -> None:
-        """5. Sensors due publish, stamped with the new time."""
+        """5. Sensors due publish, stamped with the new time, when that has come."""
+        self.wait()
         self.parts.clock.now_ns = self.world.time_ns
         self.schedule.fire(self.world.step_count)
 
