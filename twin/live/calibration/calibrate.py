@@ -130,6 +130,8 @@ class _Evidence:
             self.config.right_joints,
             lidars[0].spec.topic,
         )
+        # A controller that is late, as its odometry usually is, has heard of more.
+        self.commands = self.recorded.commands - [self.recorded.link.usual, 0.0, 0.0]
         self._check(lidars[0])
         self.expected = ExpectedScan(believed.run.world, stack.handle, lidars[0])
         self.axle = _axle(stack.handle.description)
@@ -233,7 +235,7 @@ class _Evidence:
         own = self._predict(with_wheels, way[trained & (time > self.split - _OWN_S)]).wheels
         left, right = _wheel_factors({each.name: each for each in estimates})
         motors = Wheels(time=own.time, left=own.left / left, right=own.right / right)
-        estimates += of_motors(fit_latency(motors, self.recorded.wheels))
+        estimates += of_motors(fit_latency(motors, self.recorded.wheels), self._doubt())
         patch = tuple(self._patch(estimates))
         patched = self._patched(patch)
         before, after = (self._predict(each, reference) for each in (self.scenario, patched))
@@ -257,6 +259,13 @@ class _Evidence:
         _, quat = link_poses(description)[sensor.link]
         about_z = matrix_from_quat_wxyz(quat)[2] @ gyro[:, 1:].T
         return fit_gyro(gyro[:, 0], about_z, time, np.unwrap(poses[:, 2]), covariances[:, 2, 2])
+
+    def _doubt(self) -> float:
+        """Return what one cannot tell of a latency as nobody knows in which tick commands were heard [s]."""
+        changes = np.flatnonzero(np.any(np.diff(self.commands[:, 1:], axis=0) != 0.0, axis=1)) + 1
+        phase = np.mod(self.commands[changes, 0] - self.recorded.odometry[0, 0], self.period)
+        near = np.minimum(phase, self.period - phase) < self.recorded.link.jitter / 2.0
+        return self.period * float(near.mean()) if len(near) else 0.0
 
     def _is_replaced(self, entry: FaultEntry) -> bool:
         """Return whether a fault is what is estimated here, from the start of the run to its end."""
@@ -308,7 +317,7 @@ class _Evidence:
         times = np.arange(start + lead, reference[-1, 0] - HORIZON_S / 2.0, spacing).tolist()
         places = [(t, Pose2(*_at(reference, t).tolist()) @ self.axle.inverse()) for t in times]
         places.insert(0, (start, places[0][1]))
-        return predict(scenario, self.stack.name, recorded.commands, start, float(reference[-1, 0]), places)
+        return predict(scenario, self.stack.name, self.commands, start, float(reference[-1, 0]), places)
 
     def _divergences(
         self, reference: Array, ranges: Array, drive: DriveFit, before: Predicted, after: Predicted

@@ -105,11 +105,11 @@ def of_drive(fit: DriveFit, wheel_radius: float, track: float, start: Array) -> 
         )
 
 
-def of_motors(fit: LatencyFit) -> Iterator[Estimate]:
+def of_motors(fit: LatencyFit, doubt: float) -> Iterator[Estimate]:
     """Yield how the wheels follow commands, by those of the scenario's own robot.
 
     The latency is how much later they move, as the recorder hears it; an encoder counts so much of the angle
-    by which its motor should turn.
+    by which its motor should turn. `doubt`: what is not known of the latency besides [s].
     """
     other = "" if fit.explained >= _FOLLOWS else "the wheels do not follow the commands as the model's do"
     for side, count, deviation in zip(("left", "right"), fit.counted, fit.counted_stddev, strict=True):
@@ -125,7 +125,7 @@ def of_motors(fit: LatencyFit) -> Iterator[Estimate]:
         name="latency",
         unit="s",
         value=fit.latency,
-        half_width=_95 * fit.stddev,
+        half_width=_95 * fit.stddev + doubt,
         believed=0.0,
         not_observable=other or ("the commands hardly changed" if fit.stddev > 0.05 else ""),
     )

@@ -22,6 +22,8 @@ class Link:
     """Least difference of arrival and stamp at the start: offset of the clocks plus least delay [s]."""
     drift: float
     """How much it grows, per second."""
+    usual: float
+    """By how much half of the messages are later than the least [s]."""
     jitter: float
     """By how much 95 % of the messages are later than the least at most [s]."""
     jump: tuple[float, float] | None
@@ -52,6 +54,7 @@ def link_of(heard: Array, late: Array) -> Link:
     return Link(
         least=float(least),
         drift=float(drift),
+        usual=float(np.median(rest - rest.min())),
         jitter=float(np.percentile(rest - rest.min(), 95)),
         jump=jump,
     )

@@ -189,7 +189,7 @@ def _recorded(
             raise RecordingError(f"{path}: {least}; is it another robot's bag?")
     joints = topics[_JOINTS]
     start_ns = joints.heard[0]
-    stamped = [topic for key, topic in topics.items() if key != _COMMAND]
+    stamped = [topics[key] for key in (_JOINTS, _ODOM)]  # sensors may stamp ahead of what they send
     heard = np.concatenate([_seconds(topic.heard, start_ns) for topic in stamped])
     late = np.concatenate([(np.array(topic.heard) - np.array(topic.stamps)) * 1e-9 for topic in stamped])
     link = link_of(heard, late)
