@@ -27,7 +27,7 @@ from twin.models.shapes import Box
 from twin.runtime.defaults.drives import with_drive
 from twin.runtime.obstacles import hidden_pose, standing_pose
 from twin.runtime.parameter_files.unpublished_topics import warn_of_unpublished_scans
-from twin.runtime.stacks.context import StackContext
+from twin.runtime.stacks.context import WHOLE, Layout, StackContext
 from twin.runtime.stacks.missions import AnyMission, build_missions
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.surroundings import surroundings
@@ -56,9 +56,7 @@ INPROC = SessionConfig()
 """No network: nobody else takes part."""
 _OBSTACLE_RGBA = (0.85, 0.33, 0.10, 1.0)
 
-_TREE_EACH = NodeOptions(
-    arguments=RosArguments(remappings=(RemapRule("/tf", "tf"), RemapRule("/tf_static", "tf_static")))
-)
+_TREE_EACH = (RemapRule("/tf", "tf"), RemapRule("/tf_static", "tf_static"))
 """Each of several robots has its own tree of frames in its namespace, as nav2_bringup starts them."""
 
 
@@ -89,7 +87,7 @@ def build(
     savings: Savings = ALL,
     before_nodes: Callable[[World, Bus], None] | None = None,
     clock: Clock | None = None,
-    bare: bool = False,
+    layout: Layout = WHOLE,
 ) -> Parts:
     """Build the world, the bus and all nodes.
 
@@ -102,7 +100,7 @@ def build(
         savings: What is not done over again.
         before_nodes: Called when the world is there, and the bus without a node.
         clock: What nodes take for the time; None: simulated time.
-        bare: Whether robots have the nodes of their hardware only, and no mission.
+        layout: Which nodes of robots there are, and where.
 
     Raises:
         TwinError: The scenario names something that does not exist or does not fit; the bus cannot listen.
@@ -144,6 +142,7 @@ def build(
     clock = clock or Clock()
     name = outside.session if network.networked else "twin"
     bus = Bus.of(replace(network, name=name), clock, savings=savings)
+    bus.use_sim_time = clock.is_simulated
     bus.starting()
     for tap in taps:
         bus.tap(tap)
@@ -151,8 +150,7 @@ def build(
         if before_nodes is not None:
             before_nodes(world, bus)
         control_period_ns = round(scenario.physics.control_period * 1e9)
-        alone = len(scenario.robots) == 1
-        bus.node_options = None if alone else _TREE_EACH
+        bus.node_options = _options(scenario, layout)
         stacks = {
             robot.id: RobotStack(
                 StackContext(
@@ -165,14 +163,14 @@ def build(
                     control_period_ns=control_period_ns,
                     spawn_height=heights[robot.id],
                     track_ratio=ratios[robot.id],
-                    namespace="" if alone else f"/{robot.id}",
-                    is_bare=bare,
+                    namespace=_namespace(scenario, robot),
+                    layout=layout,
                 )
             )
             for robot in scenario.robots
         }
         robots_nodes = len(bus.nodes)
-        mission = build_missions(() if bare else scenario.tasks, stacks, arena)
+        mission = build_missions(scenario.tasks if layout.autonomy == "all" else (), stacks, arena)
         deciders = bus.nodes[robots_nodes:]
         bus.node_options, bus.group = None, ""
         for place in outside.nodes:
@@ -192,6 +190,23 @@ def build(
         comers=comers,
         control_period_ns=control_period_ns,
     )
+
+
+def _namespace(scenario: Scenario, robot: RobotConfig) -> str:
+    return "" if len(scenario.robots) == 1 else f"/{robot.id}"
+
+
+def _options(scenario: Scenario, layout: Layout) -> NodeOptions | None:
+    """Return what robots' nodes are told if several share the graph, simulated or physical ones."""
+    if len(scenario.robots) == 1 and not layout.hardware:
+        return None
+    rules = []
+    if layout.commands:
+        spaces = [_namespace(scenario, robot) for robot in scenario.robots]
+        rules = [
+            RemapRule(f"{space}/cmd_vel", f"{layout.hardware}{space}/{layout.commands}") for space in spaces
+        ]
+    return NodeOptions(arguments=RosArguments(remappings=(*_TREE_EACH, *rules)))
 
 
 def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:

@@ -24,6 +24,7 @@ from twin.runtime.defaults import from_description as derive
 from twin.runtime.kept_run import KeptRun
 from twin.runtime.pacing import Pace
 from twin.runtime.run import Run
+from twin.runtime.stacks.context import WHOLE, Layout
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.threads import end_threads
 from twin.savings import ALL, Savings, uncollected
@@ -70,7 +71,7 @@ class OpenRun:
         *,
         out: Path | None = None,
         record: bool = True,
-        pace: float | None = None,
+        pace: Pace | float | None = None,
         listen: Sequence[str] = (),
         network: SessionConfig | None = None,
         outside: Outside = ALONE,
@@ -83,7 +84,8 @@ class OpenRun:
         before_nodes: Callable[[World, Bus], None] | None = None,
         viewer: str | None = None,
         clock: Clock | None = None,
-        bare: bool = False,
+        layout: Layout = WHOLE,
+        shown: Callable[[RerunSink], Callable[[Sample[Any]], None]] = lambda sink: sink.on_sample,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -107,7 +109,8 @@ class OpenRun:
             before_nodes: Called when the world is there, and the bus without a node.
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             clock: What nodes take for the time; None: simulated time.
-            bare: Whether robots have the nodes of their hardware only, and no mission.
+            layout: Which nodes of robots there are, and where.
+            shown: Returns what passes samples on to the recording.
 
         Raises:
             TwinError: The run cannot be made.
@@ -129,7 +132,8 @@ class OpenRun:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        taps = [*taps, *(tap.on_sample for tap in (self._sink, bag_tap) if tap is not None)]
+        taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
+        taps += [] if bag_tap is None else [bag_tap.on_sample]
         network = network or SessionConfig(listen=outside.endpoints(listen))
         # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
         needed = pace is not None or network.networked or workers > 0
@@ -143,7 +147,7 @@ class OpenRun:
                 savings=savings,
                 before_nodes=before_nodes,
                 clock=clock,
-                bare=bare,
+                layout=layout,
             )
             ending.callback(parts.bus.close)
             if bag_tap is not None:
@@ -162,11 +166,17 @@ class OpenRun:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
                 self._sink.declare(parts.world, wheels)
-            self._pace = None if pace is None else Pace(pace)
+            self._pace = Pace(pace) if isinstance(pace, int | float) else pace
             self._ending = ending.pop_all()
             if out is not None:
                 self._ending.callback(lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
+
+    @property
+    def due_ns(self) -> int | None:
+        """When the present simulated time is due, by `time.perf_counter_ns`; None without a pace."""
+        simulated_s = self.run.world.time_ns * 1e-9
+        return None if self._pace is None else round(self._pace.due_s(simulated_s) * 1e9)
 
     def advance(
         self,

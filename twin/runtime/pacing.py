@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-_SLACK_S = 0.1
+SLACK_S = 0.1
 """A run that is behind by no more makes up for it; what goes beyond is lost, as in Gazebo, so that nobody who
 steers it sees the robots rush."""
 
@@ -17,11 +17,12 @@ class Pace:
         self,
         factor: float,
         *,
+        slack_s: float = SLACK_S,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Start at simulated time 0 with `factor` simulated seconds per second."""
-        self._factor = factor
+        self._factor, self._slack_s = factor, slack_s
         self._clock, self._sleep = clock, sleep
         self._start = clock()
         """When the run would have started if nothing had been lost."""
@@ -31,13 +32,21 @@ class Pace:
         self.lost_s = 0.0
         """How much later the run is for it, by the clock on the wall [s]."""
 
+    def start(self) -> None:
+        """Let simulated time 0 be now."""
+        self._start = self._clock()
+
+    def due_s(self, simulated_s: float) -> float:
+        """Return when a simulated time is due, by the clock [s]."""
+        return self._start + simulated_s / self._factor
+
     def keep(self, simulated_s: float) -> None:
         """Wait until the time of a simulated one has come."""
-        ahead = self._start + simulated_s / self._factor - self._clock()
+        ahead = self.due_s(simulated_s) - self._clock()
         if ahead > 0.0:
             self._is_kept = True
             self._sleep(ahead)
-        elif ahead < -_SLACK_S:
+        elif ahead < -self._slack_s:
             self.losses += self._is_kept
             self._is_kept = False
             self.lost_s -= ahead

@@ -46,7 +46,7 @@ class Run:
         self.checks: tuple[Check, ...] = scenario.build_checks(parts.checks)
         goods = [good.name for good in self.world.scene.goods]
         needs = {field for check in self.checks for field in check.needs}
-        self._observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods, needs)
+        self.observer = Observer(self.world, tuple(parts.stacks.values()), parts.mission, goods, needs)
         if any(check.topics for check in self.checks):
             from twin.runtime.topics import watch_topics
 
@@ -104,7 +104,7 @@ class Run:
             bus=self.bus,
             robots=parts.stacks,
             obstacles=self.obstacles,
-            held=self._observer.holders,
+            held=self.observer.holders,
             mission_state=lambda: parts.mission.state,
             control_period_ns=parts.control_period_ns,
             zones=parts.checks.zones,
@@ -177,7 +177,7 @@ class Run:
     def _check(self) -> None:
         if self.workers is not None:
             self.workers.observe()
-        observation = self._observer.observe()
+        observation = self.observer.observe()
         for check in self.checks:
             check.observe(observation)
         if self.scenario.early_stop != "never" and self._is_decided():
@@ -191,7 +191,7 @@ class Run:
     def sinks(self) -> None:
         """7. Checks and recording."""
         now = self.world.time_ns
-        self._observer.gather()
+        self.observer.gather()
         if now % self._observation_ns == 0 or self.parts.mission.done:
             self._check()
         if self._sink is not None:

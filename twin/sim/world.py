@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.errors import ScenarioError, nearest
 from twin.files.writing import write_whole
-from twin.geometry import Array, Pose3
+from twin.geometry import Array, Pose2, Pose3
 from twin.savings import ALL, Savings
 from twin.sim.compose import FLOOR, build_spec, static_geom
 from twin.sim.contacts import Contact, ContactReader, Touch
@@ -168,6 +168,22 @@ class World:
             raise ScenarioError(f"no placed body '{name}' in the scene; {nearest(name, self._placed)}")
         self.data.mocap_pos[mocap_id] = T_world_body.xyz
         self.data.mocap_quat[mocap_id] = T_world_body.quat_wxyz
+
+    def shift(self, body: str, motion: Pose2) -> None:
+        """Move goods or the root link of a robot in the plane, with the motion that it has; its joints stay.
+
+        Args:
+            body: With a free joint; another is not moved.
+            motion: T_world_world, applied to the pose that it has.
+        """
+        free = self._free_joint(self.model.body(body).id)
+        if free is None:
+            return
+        qpos, dof = free
+        pose, speed = self.data.qpos[qpos : qpos + 7], self.data.qvel[dof : dof + 2]
+        moved = Pose3.from_pose2(motion) @ Pose3(pose[:3].copy(), pose[3:].copy())
+        pose[:3], pose[3:] = moved.xyz, moved.quat_wxyz
+        speed[:] = Pose2(0.0, 0.0, motion.yaw).apply(speed)
 
     def contacts(self) -> list[Contact]:
         """Return what robots touch except for the floor and themselves, as of the last physics step."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,10 +14,11 @@ from twin.bridge.qos import QoS
 from twin.bridge.services.future import Future
 from twin.bridge.services.questions import InProcessQuestion, Question, ZenohQuestion
 from twin.bridge.topics import Endpoint
+from twin.bridge.topics.link import Carried
 from twin.bridge.types import ServiceType
-from twin.bridge.wire.admission import Admission, read
+from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
-from twin.bridge.wire.keys import Attachment, pack_attachment
+from twin.bridge.wire.keys import Attachment, pack_attachment, parse_attachment
 from twin.bridge.wire.ros2dds import pack_request_id
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
@@ -48,6 +50,7 @@ class Service(Endpoint):
         self._requests, self._responses = codecs(srv_type)
         self._callback = callback
         self._open: set[Question] = set()
+        self._answers = 0
         bus = node.bus
         self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
@@ -88,7 +91,14 @@ class Service(Endpoint):
                     return  # destroyed meanwhile: the client knows
                 raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
             self._open.discard(data)
-            data.reply(self._responses.encode(response), self.node.now_ns)
+            now_ns, link = self.node.now_ns, self.node.bus.link
+            reply = partial(data.reply, self._responses.encode(response), now_ns)
+            if link is None or not external:
+                reply()
+            else:
+                self._answers += 1
+                sender = self.node.fully_qualified_name
+                link.carry_call(Carried(self.name, sender, self._answers, False, True), reply)
 
         self._open.add(data)
         self._callback(request, respond)
@@ -115,6 +125,9 @@ class Client(Endpoint):
         self._requests, self._responses = codecs(srv_type)
         self._sequence = 0
         self._pending: dict[Future, None] = {}
+        self.timed: Callable[[int, int, int], None] | None = None
+        """Called, in any thread, with when a request left by `time.perf_counter_ns`, when it was answered by
+        the server's clock, and when the answer was here [ns]; not for servers of this process."""
         node.bus.standard_services.want(name, node.bus.nodes)
         self._bridged = node.bus.naming.wire == "ros2dds"
         self._querier = node.bus.wire.declare(
@@ -192,6 +205,9 @@ class Client(Endpoint):
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
+                source = parse_attachment(attachment_of(reply.ok)) if self.timed else None
+                if self.timed and source:
+                    self.timed(asked_ns, source.time_ns, time.perf_counter_ns())
                 on_response(reply.ok.payload.to_bytes())
 
         def on_end() -> None:
@@ -203,6 +219,7 @@ class Client(Endpoint):
         if self._short and self._services.is_direct and bus.in_own_thread():
             InProcessQuestion(payload, on_response, on_end).ask(self._services.receivers, bus.deliver)
         else:
+            asked_ns = time.perf_counter_ns()
             self._querier.get(
                 direct(on_reply, on_end),
                 payload=payload,

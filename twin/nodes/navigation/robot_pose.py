@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from twin.bridge.msgs import Header, Path, ns
+from twin.bridge.services.future import Future
 from twin.bridge.tf import TransformBuffer, TransformError
 from twin.geometry import Array, Pose2
 from twin.nodes.messages import path_array
+
+_MOST_EARLY = 5
+"""So many messages of a topic wait for odometry; the oldest gives way."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +53,31 @@ class RobotPose:
     def at_stamp(self, target: str, header: Header) -> Pose2 | None:
         """Return the planar pose, in `target`, of the frame that a message was measured in, when it was."""
         return self.relative(target, header.frame_id, ns(header.stamp))
+
+    def placed(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return a callback that waits until odometry tells where a message was measured.
+
+        Messages of other processes may come before the transforms that they need, even those of one robot:
+        what tf2_ros::MessageFilter is for.
+        """
+        early: deque[Future] = deque()
+
+        def on_message(message: Any) -> None:
+            frame, stamp_ns = message.header.frame_id, ns(message.header.stamp)
+            try:
+                latest_ns = self.buffer.lookup_stamped(self.frames.odom, frame)[1]
+            except TransformError:
+                latest_ns = stamp_ns
+            if stamp_ns <= latest_ns:
+                callback(message)
+                return
+            placed = self.buffer.waiting.add(self.frames.odom, frame, stamp_ns, None)
+            placed.add_done_callback(lambda done: callback(message) if done.error is None else None)
+            early.append(placed)
+            if len(early) > _MOST_EARLY:
+                early.popleft().cancel()
+
+        return on_message
 
     def path_in_map(self, message: Path) -> Array | None:
         """Return a path as x, y, yaw in the map frame, shape (n, 3); None if its frame has no transform."""

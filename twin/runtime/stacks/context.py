@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from twin.bridge.bus import Bus
 from twin.geometry import Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.scenario.robots import RobotConfig
 from twin.sim.robot import RobotHandle
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Which nodes of robots there are, and where."""
+
+    autonomy: Literal["all", "localisation", "none"] = "all"
+    """What there is beside the nodes of the hardware (drive, joints, sensors, description); missions go with
+    all of it."""
+    hardware: str = ""
+    """Before the namespaces of the hardware's nodes: with `/twin` they are beside a physical robot, which
+    autonomy is then about."""
+    commands: str = ""
+    """Topic on which autonomy commands, behind `hardware` and the robot's namespace; empty: `cmd_vel`."""
+
+
+WHOLE = Layout()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,5 +47,9 @@ class StackContext:
     """Effective over geometric track of a skid steer, as calibrated."""
     namespace: str
     """'' for a single robot, '/name' among several."""
-    is_bare: bool = False
-    """Whether it has only the nodes of its hardware: drive, joints, sensors, description."""
+    layout: Layout = WHOLE
+
+    @property
+    def hardware_namespace(self) -> str:
+        """Of the nodes of its hardware."""
+        return self.layout.hardware + self.namespace

@@ -30,8 +30,8 @@ class RobotStack:
     """Builds and holds the nodes of one robot; what a robot lacks is not even imported."""
 
     def __init__(self, context: StackContext) -> None:
-        bus, handle, namespace = context.bus, context.handle, context.namespace
-        bus.group = namespace
+        bus, handle, namespace = context.bus, context.handle, context.hardware_namespace
+        bus.group = context.namespace
         description = handle.description
         self.name = handle.name
         self.handle = handle
@@ -56,14 +56,13 @@ class RobotStack:
             for sentence in told:
                 fused.node.get_logger().warn(sentence)
         RobotStatePublisherNode(bus, description, namespace=namespace)
-        listener = TransformListenerNode(bus, namespace=namespace)
+        listener = TransformListenerNode(bus, namespace=context.namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)
         self.manipulator = derive.manipulator(description)
         self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
         self.navigator: BtNavigatorNode | None = None
         self.slam: SlamToolboxNode | None = None
-        if not context.is_bare:
-            self._build_autonomy()
+        self._build_autonomy()
         self._build_arm(description)
         if fused is not None:
             warn_of_unpublished_sources(context, fused)
@@ -92,7 +91,7 @@ class RobotStack:
                 use_imu=getattr(context.config.localisation, "use_imu", False),
                 enable_odom_tf=enable_odom_tf,
             ),
-            namespace=context.namespace,
+            namespace=context.hardware_namespace,
         )
         if drive.guessed:
             node.node.get_logger().warn(
@@ -102,7 +101,11 @@ class RobotStack:
 
     def _build_autonomy(self) -> None:
         context, pose = self.context, self.robot_pose
+        if context.layout.autonomy == "none":
+            return
         self.slam = build_localisation(context, pose)
+        if context.layout.autonomy == "localisation":
+            return
         if context.config.navigation is not None:
             from twin.runtime.stacks.navigation import build_navigation
 
@@ -120,7 +123,8 @@ class RobotStack:
             )
 
     def _build_arm(self, description: RobotDescription) -> None:
-        bus, namespace, hardware = self.context.bus, self.context.namespace, self.handle.hardware
+        context, hardware = self.context, self.handle.hardware
+        bus, namespace = context.bus, context.hardware_namespace
         if self.manipulator is None:
             if description.commands:
                 from twin.nodes.position_controller import PositionControllerNode
@@ -135,12 +139,12 @@ class RobotStack:
             bus,
             hardware,
             self.manipulator.gripper_joint,
-            period_ns=self.context.control_period_ns,
+            period_ns=context.control_period_ns,
             namespace=namespace,
         )
-        if self.context.is_bare:
+        if context.layout.autonomy != "all":
             return
         from twin.nodes.tote_detector import ToteDetectorNode
 
-        detector = None if self.context.config.detector is None else self.context.config.detector.build()
-        ToteDetectorNode(bus, self.robot_pose, detector, namespace=namespace)
+        detector = None if context.config.detector is None else context.config.detector.build()
+        ToteDetectorNode(bus, self.robot_pose, detector, namespace=context.namespace)

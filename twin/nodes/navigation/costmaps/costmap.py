@@ -101,7 +101,7 @@ class CostmapNode:
         on_map = self._on_known_map if config.layers.rolling_window else self._on_map
         node.create_subscription(OccupancyGrid, f"{namespace}/map", on_map, LATCHED)
         for topic, source in self._scans.items():
-            on_scan = partial(self._on_scan, source)
+            on_scan = robot_pose.placed(partial(self._on_scan, source))
             node.create_subscription(LaserScan, f"{namespace}/{topic}", on_scan, SENSOR_DATA, frozen=True)
         for topic in config.range_topics:
             node.create_subscription(

@@ -30,8 +30,10 @@ class DockDetection:
         self._scans = ScanInput(robot_pose, node.now_ns)
         self._told: PoseStamped | None = None
         """The latest on `detected_dock_pose`."""
-        node.create_subscription(LaserScan, "scan", self._on_scan, SENSOR_DATA, frozen=True)
-        node.create_subscription(PoseArray, boxes, self._on_boxes, 10)
+        node.create_subscription(
+            LaserScan, "scan", robot_pose.placed(self._on_scan), SENSOR_DATA, frozen=True
+        )
+        node.create_subscription(PoseArray, boxes, robot_pose.placed(self._on_boxes), 10)
         node.create_subscription(PoseStamped, "detected_dock_pose", self._on_detected, 1)
 
     def begin(self, docked: Pose2, type_: DockType) -> None:

@@ -142,7 +142,9 @@ class AmclNode:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         node.create_subscription(OccupancyGrid, config.map_topic, self._on_map, LATCHED)
         node.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_initial_pose, 1)
-        node.create_subscription(LaserScan, config.scan_topic, self._on_scan, SENSOR_DATA, frozen=True)
+        node.create_subscription(
+            LaserScan, config.scan_topic, robot_pose.placed(self._on_scan), SENSOR_DATA, frozen=True
+        )
         node.create_service(Empty, "reinitialize_global_localization", self._on_global)
         node.create_service(Empty, "request_nomotion_update", self._on_no_motion)
         node.create_service(SetInitialPose, "set_initial_pose", self._on_set_initial_pose)

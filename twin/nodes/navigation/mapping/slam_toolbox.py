@@ -69,7 +69,9 @@ class SlamToolboxNode:
         self._entropy_publisher = node.create_publisher(Float64, "entropy", 1)
         self._pose_publisher = node.create_publisher(PoseWithCovarianceStamped, "pose", 10)
         self._graph_publisher = node.create_publisher(MarkerArray, "slam_toolbox/graph_visualization", 1)
-        node.create_subscription(LaserScan, self.config.scan_topic, self._on_scan, SENSOR_DATA, frozen=True)
+        node.create_subscription(
+            LaserScan, self.config.scan_topic, robot_pose.placed(self._on_scan), SENSOR_DATA, frozen=True
+        )
         node.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_initial_pose, 10)
         for name in ("dynamic_map", "slam_toolbox/dynamic_map"):
             node.create_service(GetMap, name, self._on_dynamic_map)

@@ -76,9 +76,13 @@ class CollisionMonitorNode:
         self._publisher = node.create_publisher(Twist, cmd_vel_out, 10)
         self._state = node.create_publisher(CollisionMonitorState, "collision_monitor_state", 10)
         for topic in scan_topics:
-            node.create_subscription(LaserScan, topic, self._keep(topic), SENSOR_DATA, frozen=True)
+            node.create_subscription(
+                LaserScan, topic, robot_pose.placed(self._keep(topic)), SENSOR_DATA, frozen=True
+            )
         for topic in range_topics:
-            node.create_subscription(Range, topic, self._keep(topic), SENSOR_DATA, frozen=True)
+            node.create_subscription(
+                Range, topic, robot_pose.placed(self._keep(topic)), SENSOR_DATA, frozen=True
+            )
         node.create_subscription(Twist, cmd_vel_in, self._on_twist, 10, frozen=True)
         node.create_service(Toggle, "collision_monitor/toggle", self._on_toggle)
 
