@@ -20,7 +20,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.msgs import Odometry, Twist, new
 from twin.geometry import Pose2, wrap_angle, yaw_from_quat_wxyz
 from twin.live.calibration.calibrate import Calibration, calibrate
-from twin.live.calibration.prediction import hardware_alone
+from twin.live.calibration.prediction import HARDWARE, hardware_alone
 from twin.live.device_clock import DeviceClock
 from twin.live.perturbations import perturbed
 from twin.runtime.open_run import OpenRun
@@ -112,7 +112,7 @@ def record(
     seeded = hardware_alone(scenario).model_copy(update={"seed": seed})
     changed, error = perturbed(scenario, perturb)
     changed = seeded.model_copy(update={"faults": changed.faults})
-    run = OpenRun(changed, record=False, bag=bag, clock=DeviceClock(START_NS, error), bare=True)
+    run = OpenRun(changed, record=False, bag=bag, clock=DeviceClock(START_NS, error), layout=HARDWARE)
     try:
         Driver(run.run.bus, seed, seconds, **how)
         world = run.run.world

@@ -20,7 +20,7 @@ from twin.live.calibration.estimates import Estimate, of_drive, of_grip, of_gyro
 from twin.live.calibration.expected_scan import ExpectedScan
 from twin.live.calibration.gyro_fit import GyroFit, fit_gyro
 from twin.live.calibration.latency import fit_latency
-from twin.live.calibration.prediction import Predicted, hardware_alone, predict
+from twin.live.calibration.prediction import HARDWARE, Predicted, hardware_alone, predict
 from twin.live.calibration.recorded import read
 from twin.live.calibration.scan_pose import ScanPose, first_pose, locate
 from twin.models.description import RobotDescription
@@ -93,7 +93,9 @@ def calibrate(scenario: Scenario, bag: Path, robot: str | None = None) -> Calibr
         ScenarioError: The scenario's robot cannot be calibrated.
     """
     name = _chosen(scenario, robot)
-    believed = OpenRun(hardware_alone(scenario.model_copy(update={"faults": ()})), record=False, bare=True)
+    believed = OpenRun(
+        hardware_alone(scenario.model_copy(update={"faults": ()})), record=False, layout=HARDWARE
+    )
     try:
         stack = believed.run.parts.stacks[name]
         found = _Evidence(scenario, stack, believed, bag)

@@ -12,9 +12,12 @@ from twin.geometry import Array, Pose2, multiply_wxyz, quat_wxyz_from_yaw, yaw_f
 from twin.live.calibration.dead_reckoning import Wheels
 from twin.live.calibration.latency import SIMULTANEOUS_S
 from twin.runtime.open_run import OpenRun
-from twin.scenario.missions import Idle
+from twin.runtime.stacks.context import Layout
 from twin.scenario.schema import Scenario
 from twin.sim.robot import RobotHandle
+
+HARDWARE = Layout(autonomy="none")
+"""Robots that do nothing but what they are told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,15 +33,8 @@ class Predicted:
 
 
 def hardware_alone(scenario: Scenario) -> Scenario:
-    """Return a scenario without an end, checks and missions."""
-    idle = {
-        "mission": Idle(type="idle"),
-        "missions": (),
-        "checks": (),
-        "early_stop": "never",
-        "duration": 1e9,
-    }
-    return scenario.model_copy(update=idle)
+    """Return a scenario without checks and an end."""
+    return scenario.model_copy(update={"checks": (), "early_stop": "never", "duration": 1e9})
 
 
 def predict(
@@ -62,7 +58,7 @@ def predict(
     Raises:
         TwinError: It cannot run.
     """
-    opened = OpenRun(hardware_alone(scenario), record=False, bare=True)
+    opened = OpenRun(hardware_alone(scenario), record=False, layout=HARDWARE)
     try:
         run = opened.run
         stack, world, period = run.parts.stacks[robot], run.world, run.parts.control_period_ns * 1e-9
