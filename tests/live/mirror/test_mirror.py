@@ -16,6 +16,7 @@ from twin.errors import RecordingError
 from twin.geometry import Pose2, wrap_angle
 from twin.live.mirror.bag_source import BagSource
 from twin.live.mirror.follower import Difference
+from twin.live.mirror.listening import past_statuses
 from twin.live.mirror.mirror import Mirror
 from twin.live.perturbations import perturbed
 from twin.live.plant import Plant
@@ -133,6 +134,13 @@ def test_a_bag_of_a_mirror_is_mirrored_again(
     common = sorted(set(ends[0]) & set(ends[1]))
     assert len(common) > 350
     assert max(abs(ends[0][s].position - ends[1][s].position) for s in common) < 0.005
+    (then,) = past_statuses(tmp_path / "own", 4.0)
+    assert then.judgement.label == "shadow"
+    assert min(pose.distance(then.virtual) for _, pose in first.poses[190:210]) < 1e-4
+    with pytest.raises(RecordingError, match=r"no mirror told of itself at 60 s; the bag is \d"):
+        past_statuses(tmp_path / "own", 60.0)
+    with pytest.raises(RecordingError, match="no mirror has told of itself there"):
+        past_statuses(recorded / "bag", 1.0)
 
 
 def test_no_bag_is_refused_in_a_sentence(scenario: Scenario) -> None:

@@ -57,12 +57,18 @@ def mirror(
         typer.Option(metavar="NAME", help="Command the robot through its `twin guard`, by this node's name."),
     ] = None,
     status: Annotated[
-        bool, typer.Option("--status", help="Print what a mirror that is running tells, and end.")
+        bool,
+        typer.Option(
+            "--status", help="Print what a mirror that is running tells, or told in --bag, and end."
+        ),
     ] = False,
+    at: Annotated[
+        float, typer.Option(metavar="SECONDS", min=0.0, help="When, after the beginning of --bag.")
+    ] = 0.0,
 ) -> None:
     """Keep virtual robots with physical ones of the same names, and tell how far apart they are."""
     if status:
-        _print_status(connect, domain)
+        _print_status(connect, domain, bag, at)
         return
     if scenario is None:
         raise typer.BadParameter("a scenario, or --status", param_hint="SCENARIO")
@@ -136,10 +142,13 @@ def _shown(robots: Mirror) -> Iterator[Callable[[], None]]:
         yield show
 
 
-def _print_status(connect: list[str] | None, domain: int) -> None:
+def _print_status(connect: list[str] | None, domain: int, bag: Path | None, at: float) -> None:
     from twin.bridge import live
-    from twin.live.mirror.listening import heard_statuses
+    from twin.live.mirror.listening import heard_statuses, past_statuses
     from twin.live.mirror.status_text import status_text
 
+    if bag is not None:
+        typer.echo(status_text(past_statuses(bag, at)))
+        return
     with live.join(connect, domain_id=domain) as process:
         typer.echo(status_text(heard_statuses(process)))

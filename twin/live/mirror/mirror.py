@@ -57,6 +57,7 @@ class Mirror:
         changes: dict[str, object] = {
             "world": scenario.world.model_copy(update={"obstacles": tuple(still)}),
             "faults": (),
+            "checks": (),
             "early_stop": "never",
             "duration": _FOR_EVER_S,
         }
