@@ -79,7 +79,7 @@ def test_a_robot_that_starts_again_is_followed_again_and_that_is_told(endpoint: 
         watched = Watched(endpoint)
         assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
     with closing(watched), program(*robot, "clock_offset=3600s"):
-        assert watched.until(lambda: watched.label == "model")
+        assert watched.until(lambda: watched.label != "twin")
         assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
         clocks = [event for event in watched.robot.events if event.what == "clock"]
         assert len(clocks) == 1
