@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
+import signal
 import socket
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 POLL_S = 0.005
 
@@ -42,3 +45,16 @@ def wait_for_listener(endpoint: str, seconds: float = 100.0) -> None:
             return probe.connect_ex((host, int(port))) == 0
 
     wait_for(listens, seconds)
+
+
+@contextlib.contextmanager
+def program(*words: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a command of `twin` beside the test until Ctrl-C, which has to end it well."""
+    command = [sys.executable, "-m", "twin.cli", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=100)
+            assert process.returncode == 0, errors

@@ -43,6 +43,8 @@ WALL_CLOCK = {
     "twin/runtime/workers/process.py": {"monotonic", "sleep"},  # waits for the end of a process
     "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
     "twin/live/plant.py": {"time_ns"},  # a physical robot's clock starts at the time of day
+    "twin/live/guard/node.py": {"monotonic_ns"},  # time-outs of a robot's commands
+    "twin/live/guard/client.py": {"monotonic_ns"},  # stamps that no setting of the clock moves
     "twin/recording/sink.py": {"monotonic_ns"},  # how much of its end a killed run may lose
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock

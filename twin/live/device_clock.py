@@ -24,14 +24,17 @@ RIGHT = ClockError()
 class DeviceClock(Clock):
     """Tells the time of day as a robot's computer does; it is set by simulated time, but nobody sees that."""
 
-    __slots__ = ("_drift", "_now_ns", "_start_ns")
+    __slots__ = ("_drift", "_now_ns", "_offset_ns", "_start_ns")
     is_simulated: ClassVar[bool] = False
 
     def __init__(self, start_ns: int, error: ClockError = RIGHT) -> None:
         """Start at a time of day [ns] of which `error` is not yet a part."""
-        self._start_ns = start_ns + round(error.clock_offset * 1e9)
-        self._drift = error.clock_drift
-        self._now_ns = self._start_ns
+        self._offset_ns, self._drift = round(error.clock_offset * 1e9), error.clock_drift
+        self.start(start_ns)
+
+    def start(self, start_ns: int) -> None:
+        """Let the robot's start be at a time of day [ns] of which the clock's error is not yet a part."""
+        self._start_ns = self._now_ns = start_ns + self._offset_ns
 
     @property
     def now_ns(self) -> int:

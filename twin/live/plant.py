@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from twin.files.writing import check_file, make_folder
 from twin.live.device_clock import RIGHT, ClockError, DeviceClock
 from twin.runtime.open_run import OpenRun
+from twin.runtime.pacing import Pace
 from twin.runtime.stacks.context import Layout
 from twin.scenario.schema import Scenario
 
@@ -48,13 +49,15 @@ class Plant:
             truth: A CSV file for where they really are, each tick; nobody but a test may look.
             bag: Folder for a bag of what the robots say and hear.
             pace: Simulated seconds per second; None: as fast as possible.
-            start_ns: Time of day at the start [ns]; None: now.
+            start_ns: Time of day at the first tick [ns]; None: the present one.
 
         Raises:
             TwinError: A robot cannot be made, or nobody can be reached.
         """
         changes: dict[str, object] = {"checks": (), "early_stop": "never", "duration": _FOR_EVER_S}
         scenario = scenario.model_copy(update=changes)
+        self._starts_now = start_ns is None
+        self._pace = None if pace is None else Pace(pace)
         self.clock = DeviceClock(time.time_ns() if start_ns is None else start_ns, error)
         with ExitStack() as ending:
             self._rows: Any = None
@@ -68,7 +71,7 @@ class Plant:
                 scenario,
                 record=False,
                 network=network,
-                pace=pace,
+                pace=self._pace,
                 bag=bag,
                 clock=self.clock,
                 layout=Layout(autonomy="all" if autonomy else "none"),
@@ -78,6 +81,11 @@ class Plant:
 
     def advance(self, until: Callable[[], bool] = lambda: False) -> None:
         """Go on until a condition holds after a tick; raises TwinError if the robots cannot go on."""
+        if self._starts_now:
+            self._starts_now = False
+            self.clock.start(time.time_ns())
+            if self._pace is not None:
+                self._pace.start()
         self.run.advance(lambda: self._tell_truth() or until())
 
     @property

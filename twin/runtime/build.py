@@ -198,12 +198,14 @@ def _namespace(scenario: Scenario, robot: RobotConfig) -> str:
 
 def _options(scenario: Scenario, layout: Layout) -> NodeOptions | None:
     """Return what robots' nodes are told if several share the graph, simulated or physical ones."""
-    rules = []
-    if layout.hardware:
-        spaces = [_namespace(scenario, robot) for robot in scenario.robots]
-        rules = [RemapRule(f"{layout.hardware}{space}/cmd_vel", f"{space}/cmd_vel") for space in spaces]
-    elif len(scenario.robots) == 1:
+    if len(scenario.robots) == 1 and not layout.hardware:
         return None
+    rules = []
+    if layout.commands:
+        spaces = [_namespace(scenario, robot) for robot in scenario.robots]
+        rules = [
+            RemapRule(f"{space}/cmd_vel", f"{layout.hardware}{space}/{layout.commands}") for space in spaces
+        ]
     return NodeOptions(arguments=RosArguments(remappings=(*_TREE_EACH, *rules)))
 
 

@@ -111,6 +111,12 @@ class Alterations:
 
     # -- what comes of it ------------------------------------------------------------------------------------
 
+    def let_through(self, geoms: Iterable[str]) -> None:
+        """Let nothing be stopped by shapes any more, by their names; rays see them as before."""
+        for name in geoms:
+            index = self._model.geom(name).id
+            self._model.geom_contype[index] = self._model.geom_conaffinity[index] = 0
+
     def grip(self, geoms: Sequence[int]) -> Grip:
         """Return how shapes held on to what they touched in the last physics step."""
         model, data = self._model, self._data

@@ -11,7 +11,9 @@ from __future__ import annotations
 import bisect
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from twin.geometry import Pose2
 
@@ -43,6 +45,17 @@ class Difference:
     """Distance of the two [m]."""
     yaw: float
     """How far the physical one is turned ahead, in (-pi, pi] [rad]."""
+    prediction: float = 0.0
+    """Distance of the physical one from where the virtual one was when that time was now [m]: what a mirror
+    says of the present is off by so much."""
+
+
+class _Noted(NamedTuple):
+    stamp_ns: int
+    driven: Pose2
+    """Where the virtual robot was without corrections."""
+    claimed: Pose2
+    """Where it was."""
 
 
 class Follower:
@@ -57,46 +70,56 @@ class Follower:
         """How often the virtual robot was put elsewhere at once."""
         self._wanted = _STILL
         self._jumps = False
-        self._driven: deque[tuple[int, Pose2]] = deque()
+        self._noted: deque[_Noted] = deque()
 
     def forget(self) -> None:
         """Forget where the virtual robot was: what comes is stamped by another clock."""
-        self._driven.clear()
+        self._noted.clear()
 
     def note(self, stamp_ns: int, virtual: Pose2) -> None:
         """Remember where the virtual robot is; times may not go back."""
-        self._driven.append((stamp_ns, self.correction.inverse() @ virtual))
-        while stamp_ns - self._driven[0][0] > self.config.history_ns:
-            self._driven.popleft()
+        self._noted.append(_Noted(stamp_ns, self.correction.inverse() @ virtual, virtual))
+        while stamp_ns - self._noted[0].stamp_ns > self.config.history_ns:
+            self._noted.popleft()
 
     def virtual_at(self, stamp_ns: int) -> Pose2 | None:
         """Return where the virtual robot was, as it is corrected by now; None if that is not remembered."""
-        if not self._driven or not self._driven[0][0] <= stamp_ns <= self._driven[-1][0]:
-            return None
-        i = bisect.bisect_left(self._driven, stamp_ns, key=lambda noted: noted[0])
-        after_ns, after = self._driven[i]
-        if after_ns == stamp_ns:
-            return self.correction @ after
-        before_ns, before = self._driven[i - 1]
-        share = (stamp_ns - before_ns) / (after_ns - before_ns)
-        step = before.inverse() @ after
-        between = Pose2(share * step.x, share * step.y, share * step.yaw)
-        return self.correction @ before @ between
+        driven = self._at(stamp_ns, lambda noted: noted.driven)
+        return None if driven is None else self.correction @ driven
 
     def measured(self, stamp_ns: int, physical: Pose2) -> Difference | None:
         """Take in where the physical robot was; None, and nothing is learnt, if that is not remembered.
 
         If it is farther away than `reset_distance`, the next step goes all the way.
         """
-        virtual = self.virtual_at(stamp_ns)
-        if virtual is None:
+        virtual, claimed = self.virtual_at(stamp_ns), self._at(stamp_ns, lambda noted: noted.claimed)
+        if virtual is None or claimed is None:
             return None
         self._wanted = physical @ virtual.inverse() @ self.correction
         offset = virtual.inverse() @ physical
-        difference = Difference(stamp_ns=stamp_ns, position=virtual.distance(physical), yaw=offset.yaw)
+        difference = Difference(
+            stamp_ns=stamp_ns,
+            position=virtual.distance(physical),
+            yaw=offset.yaw,
+            prediction=claimed.distance(physical),
+        )
         if difference.position > self.config.reset_distance:
             self._jumps = True
         return difference
+
+    def _at(self, stamp_ns: int, pose: Callable[[_Noted], Pose2]) -> Pose2 | None:
+        """Return a pose between those that are remembered, None outside of them."""
+        noted = self._noted
+        if not noted or not noted[0].stamp_ns <= stamp_ns <= noted[-1].stamp_ns:
+            return None
+        i = bisect.bisect_left(noted, stamp_ns, key=lambda entry: entry.stamp_ns)
+        after = noted[i]
+        if after.stamp_ns == stamp_ns:
+            return pose(after)
+        before = noted[i - 1]
+        share = (stamp_ns - before.stamp_ns) / (after.stamp_ns - before.stamp_ns)
+        step = pose(before).inverse() @ pose(after)
+        return pose(before) @ Pose2(share * step.x, share * step.y, share * step.yaw)
 
     def step(self, virtual: Pose2, elapsed_s: float) -> Pose2:
         """Return where the virtual robot is to be put, so much time after the last step."""

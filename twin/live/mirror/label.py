@@ -14,6 +14,9 @@ LABELS: tuple[Label, ...] = ("model", "shadow", "twin")
 """Each asks for more than those before it."""
 
 
+NOBODY = "nothing commands the robot from here"
+
+
 @dataclass(frozen=True, kw_only=True)
 class LabelConfig:
     """What each word asks for."""
@@ -21,7 +24,7 @@ class LabelConfig:
     fresh_s: float = 0.4
     """A twin's latest data may be so old [s]."""
     lost_s: float = 5.0
-    """A shadow's may be so old [s]: after that the virtual robot goes on alone."""
+    """A shadow's may be so old [s]."""
     position: float = 0.25
     """A twin is no farther from the physical robot than that [m]."""
     yaw: float = 0.35
@@ -44,7 +47,7 @@ class Evidence:
     """The robot's clock is known so well [s]; None: it is not."""
     acknowledged: bool = False
     """Whether what was last commanded from here was obeyed, as its acknowledgement or its motion tells."""
-    commands: str = "nothing commands the robot from here"
+    commands: str = NOBODY
     """Why `acknowledged` is false, if it is."""
     doubts: tuple[str, ...] = ()
     """What else forbids the word `twin`: two robots with one name, data that cannot be."""

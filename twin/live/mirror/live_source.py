@@ -45,6 +45,13 @@ class LiveSource(Source):
         estimate = None if self.exchanges is None else self.exchanges.estimate
         return None if estimate is None else estimate.bound_s
 
+    @property
+    def clock_offset_s(self) -> float | None:
+        """As of the latest answer [s]."""
+        now_ns = time.perf_counter_ns()
+        other_ns = None if self.exchanges is None else self.exchanges.other_ns(now_ns)
+        return None if other_ns is None else (other_ns - time.time_ns()) * 1e-9
+
     def begin(self, run: OpenRun, clock: FollowedClock) -> None:
         """Wait a moment for the first answers, so that the first stamps are those of the robot's clock."""
         bus = run.run.bus

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
 
-from twin.bridge.msgs import DiagnosticArray, DiagnosticStatus, KeyValue, String, header
+from twin.bridge.msgs import DiagnosticArray, String
 from twin.bridge.qos import LATCHED
 from twin.live.mirror.followed_clock import FollowedClock
-from twin.live.mirror.label import LABELS, Evidence, Judgement, judge
-from twin.live.mirror.robot import MirroredRobot
+from twin.live.mirror.label import Label
+from twin.live.mirror.robot import COMMANDED, MirroredRobot
 from twin.live.mirror.source import Source
+from twin.live.mirror.status import Status, to_array, worst
 from twin.runtime.open_run import OpenRun
 from twin.runtime.stacks.context import Layout
 from twin.scenario.schema import Scenario
@@ -22,16 +22,6 @@ NAMESPACE = "/twin"
 """Before the namespaces of virtual robots."""
 _FOR_EVER_S = 1e9
 _STATUS_NS = 100_000_000
-_LEVELS = {"twin": 0, "shadow": 1, "model": 2}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Status:
-    """Of one robot, now."""
-
-    robot: str
-    judgement: Judgement
-    evidence: Evidence
 
 
 class Mirror:
@@ -43,6 +33,7 @@ class Mirror:
         source: Source,
         *,
         autonomy: Literal["all", "localisation", "none"] = "none",
+        guard: str | None = None,
         out: Path | None = None,
         bag: Path | None = None,
     ) -> None:
@@ -52,13 +43,22 @@ class Mirror:
             scenario: Its robots and world; its localisation, navigation and missions, as `autonomy` says.
             source: Where the physical robots are.
             autonomy: What of the physical robots' autonomy runs here.
+            guard: Name of the guards' nodes, behind the robots' namespaces, through which autonomy here
+                commands them; None: it does by `cmd_vel`.
             out: Folder for a recording; None: there is none.
             bag: Folder for a bag of everything that was heard and said; it can be a source again.
 
         Raises:
             TwinError: A robot cannot be made, or nobody can be reached.
         """
-        changes: dict[str, object] = {"faults": (), "early_stop": "never", "duration": _FOR_EVER_S}
+        # When something comes or walks is not known of a world that is.
+        still = [box for box in scenario.world.obstacles if box.route is None and box.appears_within is None]
+        changes: dict[str, object] = {
+            "world": scenario.world.model_copy(update={"obstacles": tuple(still)}),
+            "faults": (),
+            "early_stop": "never",
+            "duration": _FOR_EVER_S,
+        }
         self.source, self.clock = source, FollowedClock(source.start_ns)
         with ExitStack() as ending:
             ending.callback(source.close)
@@ -70,19 +70,21 @@ class Mirror:
                 pace=source.pace,
                 bag=bag,
                 clock=self.clock,
-                layout=Layout(autonomy=autonomy, hardware=NAMESPACE),
+                layout=Layout(
+                    autonomy=autonomy, hardware=NAMESPACE, commands="" if guard is None else COMMANDED
+                ),
             )
             ending.callback(self.run.close)
             run = self.run.run
             stacks = run.parts.stacks.values()
             self.robots = tuple(
-                MirroredRobot(stack, run.world, held=run.observer.holders) for stack in stacks
+                MirroredRobot(stack, run.world, held=run.observer.holders, guard=guard) for stack in stacks
             )
             node = run.bus.create_node("status", NAMESPACE)
             self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
             self._label = node.create_publisher(String, "label", LATCHED)
             self._told_ns = 0
-            self._labels: dict[str, str] = {}
+            self._told: Label | None = None
             source.begin(self.run, self.clock)
             self._ending = ending.pop_all()
 
@@ -92,18 +94,7 @@ class Mirror:
 
     def statuses(self) -> list[Status]:
         """Return how each robot is mirrored now."""
-        found = []
-        for robot in self.robots:
-            difference = robot.difference
-            heard_ns = robot.heard_ns
-            evidence = Evidence(
-                age_s=None if heard_ns is None else max(0.0, (self.clock.now_ns - heard_ns) * 1e-9),
-                position=None if difference is None else difference.position,
-                yaw=None if difference is None else difference.yaw,
-                clock_bound_s=self.source.clock_bound_s,
-            )
-            found.append(Status(robot=robot.stack.name, judgement=judge(evidence), evidence=evidence))
-        return found
+        return [robot.status(self.clock.now_ns, self.source) for robot in self.robots]
 
     def __enter__(self) -> Self:
         return self
@@ -129,29 +120,8 @@ class Mirror:
         return self.source.over
 
     def _tell(self, statuses: list[Status]) -> None:
-        array = DiagnosticArray(header=header(self.clock.now_ns, ""), status=[])
-        for status in statuses:
-            label = status.judgement.label
-            values = {
-                "age_s": status.evidence.age_s,
-                "position_m": status.evidence.position,
-                "yaw_rad": status.evidence.yaw,
-                "clock_bound_s": status.evidence.clock_bound_s,
-            }
-            array.status.append(
-                DiagnosticStatus(
-                    level=_LEVELS[label],
-                    name=f"twin: {status.robot}",
-                    message=f"{label}: {'; '.join(status.judgement.why)}".removesuffix(": "),
-                    hardware_id=status.robot,
-                    values=[
-                        KeyValue(key=key, value="" if value is None else f"{value:.6g}")
-                        for key, value in values.items()
-                    ],
-                )
-            )
-        self._diagnostics.publish(array)
-        worst = min((status.judgement.label for status in statuses), key=LABELS.index)
-        if self._labels.get("") != worst:
-            self._labels[""] = worst
-            self._label.publish(String(data=worst))
+        self._diagnostics.publish(to_array(statuses, self.clock.now_ns))
+        label = worst(statuses)
+        if label != self._told:
+            self._told = label
+            self._label.publish(String(data=label))

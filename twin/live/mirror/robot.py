@@ -3,21 +3,36 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from twin.bridge.msgs import Float64, JointState, PoseStamped, TFMessage, ns
+from twin.bridge.msgs import Float64, JointState, Odometry, PoseStamped, TFMessage, Twist, ns
 from twin.bridge.qos import SENSOR_DATA
+from twin.bridge.topics import Publisher
 from twin.geometry import Pose2
+from twin.live.guard.client import GuardClient
+from twin.live.guard.gate import Velocity
+from twin.live.guard.verdict import Verdict
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
+from twin.live.mirror.label import Evidence, LabelConfig, judge
+from twin.live.mirror.obedience import Obedience
+from twin.live.mirror.source import Source
+from twin.live.mirror.status import Status
 from twin.nodes.messages import pose_stamped
 from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World
 
 _PENDING = 200
+_STUCK = 0.06
+"""A virtual robot that is so far from the physical one [m], and touches something, may be held by it ..."""
+_STUCK_TICKS = 5
+"""... and is if it does for so long."""
 _WORLD = "map"
+COMMANDED = "commanded"
+"""Topic, in the virtual robot's namespace, of what autonomy here commands if a guard is to pass it on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +55,7 @@ class MirroredRobot:
         world: World,
         *,
         held: Callable[[], dict[str, str]],
+        guard: str | None = None,
         config: FollowerConfig | None = None,
     ) -> None:
         """Hear the robot of the stack's namespace.
@@ -48,10 +64,12 @@ class MirroredRobot:
             stack: The virtual robot's nodes.
             world: It is in.
             held: Which robot holds each good.
+            guard: Name of the guard's node, behind the robot's namespace, through which autonomy here
+                commands the robot; None: it does by `cmd_vel`.
             config: How hard it follows.
         """
         context = stack.context
-        self.stack, self.follower = stack, Follower(config)
+        self.stack, self.follower, self.obedience = stack, Follower(config), Obedience()
         self.node = node = context.bus.create_node("mirror", context.hardware_namespace)
         self.difference: Difference | None = None
         """The latest, before it was corrected."""
@@ -65,7 +83,10 @@ class MirroredRobot:
             context.layout.autonomy != "none" and localisation is not None and localisation.type != "none"
         )
         self._pending: deque[tuple[int, Pose2]] = deque(maxlen=_PENDING)
+        self._stuck: dict[str, int] = {}
+        """For how many ticks the virtual robot has touched what, while it was left behind."""
         self._latest_ns = -1
+        self._physical: Pose2 | None = None
         self._joints: dict[str, float] = {}
         commands = stack.handle.description.commands
         self._positions = {name for name, command in commands.items() if command.interface == "position"}
@@ -74,11 +95,45 @@ class MirroredRobot:
         node.create_subscription(
             JointState, f"{space}/joint_states", self._on_joints, SENSOR_DATA, frozen=True
         )
+        node.create_subscription(Odometry, f"{space}/odom", self._on_odometry, 10, frozen=True)
+        self._commands = node.create_subscription(
+            Twist, f"{space}/cmd_vel", self._on_command, 10, frozen=True
+        )
+        self._relayed = node.create_publisher(Twist, "cmd_vel", 10)
+        self.guard: GuardClient | None = None
+        if guard is not None:
+            self.guard = GuardClient(node, guard=f"{space}/{guard}", monotonic_ns=time.perf_counter_ns)
+            node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
         self._series = {
-            name: node.create_publisher(Float64, f"divergence/{name}", 10) for name in ("position", "yaw")
+            name: node.create_publisher(Float64, f"divergence/{name}", 10)
+            for name in ("position", "yaw", "prediction")
         }
         node.create_task(self._run())
+
+    def status(self, now_ns: int, source: Source) -> Status:
+        """Return how it is mirrored at a time of the robot's clock [ns]."""
+        difference, heard_ns = self.difference, self.heard_ns
+        acknowledged, commands = self._obeyed() if source.is_live else (False, "a bag obeys no commands")
+        guarded = self.guard.status if self.guard is not None and self.guard.is_present else None
+        evidence = Evidence(
+            age_s=None if heard_ns is None else max(0.0, (now_ns - heard_ns) * 1e-9),
+            position=None if difference is None else difference.position,
+            yaw=None if difference is None else difference.yaw,
+            clock_bound_s=source.clock_bound_s,
+            acknowledged=acknowledged,
+            commands=commands,
+            doubts=() if guarded is None else guarded.warnings,
+        )
+        return Status(
+            robot=self.stack.name,
+            judgement=judge(evidence),
+            evidence=evidence,
+            virtual=self._world.pose(self.stack.handle.base).to_pose2(),
+            physical=self._physical,
+            clock_offset_s=source.clock_offset_s,
+            resets=self.follower.resets,
+        )
 
     def forget(self) -> None:
         """Begin anew, where the virtual robot is: the robot's clock was set."""
@@ -104,6 +159,8 @@ class MirroredRobot:
         moved = self.follower.step(virtual, elapsed_s)
         if self.follower.resets > resets:
             self.tell("reset", f"put {virtual.distance(moved):.2f} m away, where the physical robot is")
+            self.stack.handle.carry(self.stack.standing(virtual))
+        self._let_through()
         motion = moved @ virtual.inverse()
         if motion.distance(Pose2(0.0, 0.0, 0.0)) > 0.0 or motion.yaw != 0.0:
             world.shift(base, motion)
@@ -114,13 +171,29 @@ class MirroredRobot:
             self.stack.handle.hardware.command(joint, position)
         self._pose.publish(pose_stamped(moved, _WORLD, now_ns))
 
+    def _let_through(self) -> None:
+        """Take away what stops the virtual robot where the physical one goes on."""
+        if self.difference is None or self.difference.position < _STUCK:
+            self._stuck.clear()
+            return
+        robot, goods = f"{self.stack.name}/", {good.name for good in self._world.scene.goods}
+        for contact in self._world.contacts():
+            if not contact.body1.startswith(robot) or contact.body2 in goods:
+                continue
+            self._stuck[contact.body2] = self._stuck.get(contact.body2, 0) + 1
+            if self._stuck[contact.body2] == _STUCK_TICKS:
+                self.tell("model", f"{contact.body2} is in the way, but not in that of the physical robot")
+            if self._stuck[contact.body2] >= _STUCK_TICKS:
+                self._world.alterations.let_through(solid for _, solid in contact.geoms)
+
     def _measure(self, stamp_ns: int, physical: Pose2) -> None:
         difference = self.follower.measured(stamp_ns, physical)
         if difference is None:
             return
-        self.difference = difference
+        self.difference, self._physical = difference, physical
         self._series["position"].publish(Float64(data=difference.position))
         self._series["yaw"].publish(Float64(data=difference.yaw))
+        self._series["prediction"].publish(Float64(data=difference.prediction))
 
     def _on_tf(self, message: TFMessage) -> None:
         frames = self.stack.frames
@@ -149,6 +222,48 @@ class MirroredRobot:
         for name, position in zip(message.name, message.position, strict=False):
             if name in self._positions and math.isfinite(position):
                 self._joints[name] = position
+
+    def _send(self, message: Twist) -> None:
+        assert self.guard is not None
+        self.guard.send(Velocity(message.linear.x, message.linear.y, message.angular.z))
+
+    def _obeyed(self) -> tuple[bool, str]:
+        """Return whether the robot does what is commanded from here, and in words."""
+        if self.guard is None:
+            return self.obedience.obeyed is True, self.obedience.text
+        if not self.guard.is_present or self.guard.status is None:
+            return False, "the robot's guard does not answer"
+        if self.guard.status.is_stopped:
+            return False, self.guard.status.words
+        if self.guard.latest is None:
+            return False, "nothing has been commanded through the guard"
+        verdict, trip_s = self.guard.latest.said.verdict, self.guard.latest.round_trip_s
+        if verdict is not Verdict.ACCEPTED:
+            return False, f"the guard refuses what is commanded from here: {verdict}"
+        return True, f"acknowledged by the guard, the latest in {1e3 * trip_s:.0f} ms"
+
+    def _on_command(self, message: Twist) -> None:
+        if self._flows():
+            self._relayed.publish(message, frozen=True)
+        source = self._commands.source
+        if source is not None and source.gid in self._own_commands():
+            self.obedience.command(self.node.now_ns, message.linear.x, message.angular.z)
+
+    def _flows(self) -> bool:
+        """Return whether commands reach the physical robot, as far as can be told: it is heard.
+
+        What does not reach it is kept from the virtual one, too; without a physical one, that is commanded.
+        """
+        return self.heard_ns is None or self.node.now_ns - self.heard_ns < LabelConfig.fresh_s * 1e9
+
+    def _own_commands(self) -> set[bytes]:
+        """Return who commands the physical robot from this process."""
+        ends = [end for node in self.node.bus.nodes for end in node.endpoints]
+        return {end.gid for end in ends if isinstance(end, Publisher) and end.name == self._commands.name}
+
+    def _on_odometry(self, message: Odometry) -> None:
+        twist = message.twist.twist
+        self.obedience.motion(self.node.now_ns, twist.linear.x, twist.angular.z)
 
     def tell(self, what: str, text: str) -> None:
         """Note an event, and log it."""

@@ -33,6 +33,11 @@ class Source(ABC):
         return None
 
     @property
+    def clock_offset_s(self) -> float | None:
+        """The robots' clock minus the one of this computer, or of the recorder [s]; None: it is not known."""
+        return None
+
+    @property
     def over(self) -> bool:
         """Whether nothing comes any more."""
         return False

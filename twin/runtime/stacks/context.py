@@ -21,7 +21,9 @@ class Layout:
     all of it."""
     hardware: str = ""
     """Before the namespaces of the hardware's nodes: with `/twin` they are beside a physical robot, which
-    obeys the same `cmd_vel`, and which autonomy is then about."""
+    autonomy is then about."""
+    commands: str = ""
+    """Topic on which autonomy commands, behind `hardware` and the robot's namespace; empty: `cmd_vel`."""
 
 
 WHOLE = Layout()

@@ -1,0 +1,86 @@
+"""A mirror beside a robot of another process, by the clock on the wall."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from contextlib import closing
+from typing import Any
+
+from tests.cable import Cable
+from tests.processes import program, wait_for_listener
+from twin.bridge.wire.session import SessionConfig
+from twin.geometry import Pose2
+from twin.live.mirror.live_source import LiveSource
+from twin.live.mirror.mirror import Mirror
+from twin.scenario.schema import load
+
+LONG_S = 100.0
+TICK_S = 0.02
+
+
+class Watched:
+    """A mirror of the figure of eight, whose mission runs here, and what it was at each tick."""
+
+    def __init__(self, endpoint: str) -> None:
+        source = LiveSource(SessionConfig(mode="client", connect=(endpoint,)))
+        self.mirror = Mirror(load("diff_bot_figure8"), source, autonomy="all")
+        (self.robot,) = self.mirror.robots
+        self.world = self.mirror.run.run.world
+        self.ticks: list[tuple[float, str, float | None, Pose2]] = []
+        """Time [s], label, age of the data [s], pose of the virtual robot."""
+
+    def until(self, condition: Callable[[], Any], seconds: float = LONG_S) -> bool:
+        """Go on until a condition holds; False if it does not in so many simulated seconds."""
+        end_s = self.world.time_ns * 1e-9 + seconds
+        held = False
+
+        def look() -> bool:
+            nonlocal held
+            (status,) = self.mirror.statuses()
+            now_s = self.world.time_ns * 1e-9
+            self.ticks.append((now_s, status.judgement.label, status.evidence.age_s, status.virtual))
+            held = bool(condition())
+            return held or now_s > end_s
+
+        self.mirror.advance(look)
+        return held
+
+    @property
+    def label(self) -> str:
+        return self.ticks[-1][1]
+
+    def close(self) -> None:
+        self.mirror.close()
+
+
+def test_a_cut_link_degrades_it_at_once_and_it_comes_back_without_a_jump(endpoint: str) -> None:
+    with program("plant", "diff_bot_figure8", "--listen", endpoint):
+        wait_for_listener(endpoint)
+        with closing(Cable(endpoint)) as cable, closing(Watched(cable.endpoint)) as watched:
+            assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
+            cable.whole.clear()
+            before = len(watched.ticks)
+            assert watched.until(lambda: watched.label != "twin")
+            assert watched.ticks[-1][2] <= 0.4 + 2 * TICK_S
+            watched.until(lambda: False, 3.0)
+            resets = watched.robot.follower.resets
+            cable.whole.set()
+            assert watched.until(lambda: watched.label == "twin")
+            poses = [pose for _, _, _, pose in watched.ticks[before:]]
+            assert max(a.distance(b) for a, b in itertools.pairwise(poses)) < TICK_S * (0.5 + 0.6)
+            assert watched.robot.follower.resets == resets
+
+
+def test_a_robot_that_starts_again_is_followed_again_and_that_is_told(endpoint: str) -> None:
+    robot = ["plant", "diff_bot_figure8", "--listen", endpoint, "--perturb"]
+    with program(*robot, "clock_offset=0s"):
+        wait_for_listener(endpoint)
+        watched = Watched(endpoint)
+        assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
+    with closing(watched), program(*robot, "clock_offset=3600s"):
+        assert watched.until(lambda: watched.label == "model")
+        assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
+        clocks = [event for event in watched.robot.events if event.what == "clock"]
+        assert len(clocks) == 1
+        assert "set by +36" in clocks[0].text
