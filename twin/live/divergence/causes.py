@@ -1,7 +1,6 @@
 """What makes the physical robot differ from its model: one rule for each cause.
 
-A rule names its cause only if the evidence tells it from the others; what differs for no cause that is named is
-`unknown`.
+A rule names its cause only if the evidence tells it from the others; what differs for none is `unknown`.
 """
 
 from __future__ import annotations
@@ -39,7 +38,9 @@ _SURE = 5.0
 _LOCALISED_S = 4.0
 """For so long a robot has to be where it is thought to be, before what it sees is a thing there [s]."""
 _POSITION, _YAW, _EXPLAINED = 0.15, 0.15, 0.75
-"""What two robots may differ by for a while without a reason [m], [rad], and how much of a scan needs one."""
+"""What two robots may differ by without a reason [m], [rad], and how much of a scan has to be explained."""
+_NIS = 3.0
+"""The mean NIS may be so many times larger than by chance: localisation's covariance is an estimate, too."""
 
 
 def causes(evidence: Evidence) -> list[Finding]:
@@ -48,7 +49,7 @@ def causes(evidence: Evidence) -> list[Finding]:
     if odometry is None:
         return []
     if odometry.age_s >= THRESHOLDS["silent robot"].off:
-        text = f"nothing came for {odometry.age_s:.1f} s: the robot stands still without power, or its link is cut"
+        text = f"nothing came for {odometry.age_s:.1f} s: it has no power, or its link is cut"
         return [Finding(cause="silent robot", number=odometry.age_s, text=text)]
     doubles = list(_duplicate(evidence))
     if any(found.number >= THRESHOLDS[found.cause].off for found in doubles):
@@ -90,7 +91,7 @@ def _duplicate(evidence: Evidence) -> Iterator[Finding]:
         text = f"{evidence.publishers} robots publish the same odometry"
         yield Finding(cause="duplicate robot", number=float(evidence.publishers - 1), text=text)
     elif evidence.alternating:
-        text = f"{evidence.alternating:.0%} of the odometry contradicts the rest, to and fro: of two robots with one name"
+        text = f"{evidence.alternating:.0%} of the odometry is of another robot with the same name"
         yield Finding(cause="duplicate robot", number=evidence.alternating, text=text)
 
 
@@ -176,7 +177,7 @@ def _kidnapped(evidence: Evidence) -> Iterator[Finding]:
         return
     if min(scan.shorter, scan.longer) < 0.05:
         return
-    text = f"from one scan to the next {1.0 - scan.explained:.0%} of the rays ended elsewhere, while the wheels tell of no such motion"
+    text = f"{1.0 - scan.explained:.0%} of the rays end elsewhere from one scan to the next: it was moved"
     yield Finding(cause="kidnapped", number=1.0 - scan.explained, text=text)
 
 
@@ -187,10 +188,12 @@ def _slip(evidence: Evidence) -> Iterator[Finding]:
     drove = sum(abs(stretch.residual) for stretch in evidence.slipped)
     if turned > drove:
         times = len(evidence.twisted)
-        text = f"in {times} half seconds the robot turned by {math.degrees(turned):.0f} deg otherwise than its wheels tell"
+        text = (
+            f"it turned by {math.degrees(turned):.0f} deg in {times / 2:g} s that its wheels do not tell of"
+        )
         yield Finding(cause="wheel slip", number=turned, text=text)
     elif len(evidence.slipped) > 1:  # a single one may be localisation that errs
-        text = f"wheels tell of {drove:.2f} m in {len(evidence.slipped)} stretches that the robot did not drive so"
+        text = f"its wheels tell of {drove:.2f} m that it did not drive"
         yield Finding(cause="wheel slip", number=drove, text=text)
 
 
@@ -246,7 +249,7 @@ def _response(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _unknown(evidence: Evidence) -> Iterator[Finding]:
-    scan = evidence.scan
+    scan, nis, bound = evidence.scan, evidence.nis, evidence.nis_bound
     rows = [
         (evidence.position, _POSITION, "the robots are {:.2f} m apart"),
         (None if evidence.yaw is None else abs(evidence.yaw), _YAW, "one is turned by {:.2f} rad"),
@@ -255,15 +258,9 @@ def _unknown(evidence: Evidence) -> Iterator[Finding]:
             1.0 - _EXPLAINED,
             "{:.0%} of the rays end where nothing was expected",
         ),
+        (nis, _NIS * (bound or 1.0), "the normalised innovation squared is {:.1f}, not 3"),
     ]
-    if evidence.nis is not None and evidence.nis_bound:
-        rows.append(
-            (evidence.nis, 3.0 * evidence.nis_bound, "the normalised innovation squared is {:.1f}, not 3")
-        )
-    worst = max(
-        (each for each in rows if each[0] is not None), key=lambda each: each[0] / each[1], default=None
-    )
-    if worst is not None and worst[0] is not None:
-        number, allowed, text = worst
-        assert number is not None
-        yield Finding(cause="unknown", number=number / allowed, text=text.format(number))
+    known = [(number / allowed, text.format(number)) for number, allowed, text in rows if number is not None]
+    if known:
+        number, text = max(known)
+        yield Finding(cause="unknown", number=number, text=text)

@@ -1,10 +1,11 @@
 """Whether localisation and odometry contradict each other more than their covariances admit.
 
-The innovation is where localisation finds the robot, minus where odometry has taken it from where localisation
-found it before. Its covariance is the sum of those that the robot itself states: of both poses of
-localisation (taken as independent), and what that of odometry grew by in between. The normalised innovation
-squared, NIS, has then a mean of 3, its degrees of freedom; that of n of them, times n, is chi-squared with 3n
-(Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 5.4).
+The innovation is where localisation finds the robot, minus where odometry has taken it from where
+localisation found it before. Its covariance is the sum of those that the robot itself states: of both poses
+of localisation (taken as independent), and what that of odometry grew by in between. The normalised
+innovation squared, NIS, has then a mean of 3, its degrees of freedom; that of n of them, times n, is
+chi-squared with 3n (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation,
+2001, 5.4). Localisation that uses odometry states more than that, so the mean of a good one is below 3.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Divergence of one pair of robots: series, alarms and their sum, from stamped data alone.
 
-All stamps and times are of the physical robot's clock [ns]; nothing else is looked at, so data of a bag give the
-same as they gave live.
+All stamps and times are of the physical robot's clock [ns]; nothing else is looked at, so data of a bag give
+the same as they gave live.
 """
 
 from __future__ import annotations
@@ -49,8 +49,10 @@ _PAIRED_NS = 60_000_000
 _WAITS_NS = 2_000_000_000
 _SLIPPED, _TWISTED = 0.06, 0.04
 """Odd stretches are off by that [m], [rad]."""
-_UNSURE, _UNSURE_RESIDUAL = 0.6, 0.06
-"""A robot is not where it is thought to be if less of a scan is explained, or only that badly [m]."""
+_UNSURE, _CONTRARY, _UNSURE_RESIDUAL = 0.6, 0.05, 0.06
+"""A robot is not where it is thought to be if less of a scan is explained, and rays of it end both before and
+behind what is expected; or if what is explained differs by so much [m]. What stands before a lidar hides much
+of it, but makes no ray longer."""
 _BREAK = 0.3
 """So much less of a scan is explained than of the one before it: one of the two robots was moved."""
 _STILL = 1e-3
@@ -76,8 +78,8 @@ class Report:
 class DivergenceMonitor:
     """Takes what was heard of both robots, in any order between them; `step` judges it."""
 
-    NAMES = ("position", "yaw", "nis", "scan", "scan_residual", "event", "delay", "latency")
-    """Series: metres, radians, mean NIS, share of unexplained rays, metres, and seconds."""
+    NAMES = ("position", "yaw", "prediction", "nis", "scan", "scan_residual", "event", "delay", "latency")
+    """Series: metres, radians, metres, mean NIS, share of unexplained rays, metres, and seconds."""
 
     def __init__(self, told: Callable[[str, float], None] = lambda name, value: None) -> None:
         """Begin; `told` is called with each new value of a series."""
@@ -120,7 +122,8 @@ class DivergenceMonitor:
         self._believed: Believed | None = None
         self._found_jump: tuple[int, Pose2] | None = None
         self._gyro: deque[tuple[int, float]] = deque(maxlen=2000)
-        self._gyro_bias, self._gyro_from_ns = 0.0, None
+        self._gyro_bias = 0.0
+        self._gyro_from_ns: int | None = None
         self._standing: deque[tuple[int, float]] = deque(maxlen=20)
 
     def _begin_scans(self) -> None:
@@ -183,10 +186,11 @@ class DivergenceMonitor:
             return
         self._waiting.append(Believed(stamp_ns=stamp_ns, pose=pose, covariance=_planar(covariance)))
 
-    def difference(self, stamp_ns: int, position: float, yaw: float) -> None:
-        """Take how far the robots were apart [m], [rad]."""
+    def difference(self, position: float, yaw: float, prediction: float) -> None:
+        """Take how far the robots were apart [m], [rad], and how wrong the prediction had been [m]."""
         self._add("position", position)
         self._add("yaw", yaw)
+        self._add("prediction", prediction)
 
     def gyroscope(self, stamp_ns: int, rate: float) -> None:
         """Take the physical robot's turn rate [rad/s]."""
@@ -272,9 +276,9 @@ class DivergenceMonitor:
                 return
             self._waiting.popleft()
             before = self._believed
-            if before is not None and after.stamp_ns - before.stamp_ns < _TURN_NS:
-                if self._odom.at(before.stamp_ns) is not None:
-                    continue  # a longer stretch tells more
+            early = before is not None and after.stamp_ns - before.stamp_ns < _TURN_NS
+            if early and before is not None and self._odom.at(before.stamp_ns) is not None:
+                continue  # a longer stretch tells more
             self._believed = after
             if before is None or after.stamp_ns <= before.stamp_ns:
                 continue
@@ -374,11 +378,10 @@ class DivergenceMonitor:
     def _take_scans(self) -> None:
         while self._scans and self._virtual_scans:
             scan, T_base_lidar = self._scans[0]
-            latest = self._virtual.latest
-            if latest is None or min(latest.stamp_ns, self._virtual_scans[-1].stamp_ns) < scan.stamp_ns:
-                # A virtual lidar that is slower would never be later; half a second is enough to see that.
-                if self._virtual_scans[-1].stamp_ns > scan.stamp_ns - _WAITS_NS:
-                    return
+            latest, newest_ns = self._virtual.latest, self._virtual_scans[-1].stamp_ns
+            waits = latest is None or min(latest.stamp_ns, newest_ns) < scan.stamp_ns
+            if waits and newest_ns > scan.stamp_ns - _WAITS_NS:
+                return  # a later one may be nearer
             self._scans.popleft()
             expected = min(self._virtual_scans, key=lambda one: abs(one.stamp_ns - scan.stamp_ns))
             places = self._virtual.at(expected.stamp_ns), self._virtual.at(scan.stamp_ns)
@@ -398,7 +401,8 @@ class DivergenceMonitor:
             self._places = Places()
             return
         self._add("scan_residual", match.residual)
-        if match.explained < _UNSURE or match.residual > _UNSURE_RESIDUAL:
+        contrary = min(match.shorter, match.longer) > _CONTRARY
+        if (match.explained < _UNSURE and contrary) or match.residual > _UNSURE_RESIDUAL:
             self._unsure_ns = match.stamp_ns
             self._places = Places()
         self._places.take(match.stamp_ns, lidar, match.things)

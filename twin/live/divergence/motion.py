@@ -1,8 +1,8 @@
 """How far and how much a robot went, as different things tell it, over the last metres.
 
-A wheel of another radius is wrong by the same share of each metre and each turn, another track by that of each
-turn, a wheel that slips by a lot in some of them: so shares come with how sure they are, and with how far off
-single stretches were.
+A wheel of another radius is wrong by the same share of each metre and each turn, another track by that of
+each turn, a wheel that slips by a lot in some of them: so shares come with how sure they are, and with how far
+off single stretches were.
 """
 
 from __future__ import annotations

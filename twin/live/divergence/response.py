@@ -63,7 +63,7 @@ class Responses:
         first = max(self._physical[0][0], self._virtual[0][0])
         if last - first < _WINDOW_NS // 2:
             return nothing
-        times = np.arange(first, last, _PERIOD_NS)
+        times = np.arange(first, last, _PERIOD_NS, dtype=np.float64)
         physical, virtual = (_sampled(rows, times, first) for rows in (self._physical, self._virtual))
         way = np.abs(virtual).sum() * _PERIOD_NS * 1e-9
         ratio = float(np.abs(physical).sum() / np.abs(virtual).sum()) if way >= _LEAST else None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from twin.geometry import Array, Pose2
@@ -43,7 +44,7 @@ class Scan:
     @property
     def angles(self) -> Array:
         """Directions of the rays, shape (n,) [rad]."""
-        return self.angle_min + self.angle_increment * np.arange(len(self.ranges))
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +152,7 @@ def _between(angles: Array, ranges: Array, wanted: Array, neighbours: float) -> 
 
 
 def _things(
-    kind: Literal["more", "less"], odd: Array, ranges: Array, angles: Array, least: int
+    kind: Literal["more", "less"], odd: NDArray[np.bool_], ranges: Array, angles: Array, least: int
 ) -> list[Thing]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], odd.astype(np.int8), [0]])))
     found = []
