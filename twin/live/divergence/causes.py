@@ -18,8 +18,8 @@ THRESHOLDS = {
     "lossy link": Threshold(on=0.15, off=0.08, for_s=2.0),  # share of messages
     "invalid data": Threshold(on=1.0, off=1.0, for_s=0.0),  # messages
     "duplicate robot": Threshold(on=0.15, off=0.05, for_s=1.0),  # share of messages, or 1 for each robot more
-    "robot restarted": Threshold(on=0.0, off=0.0, for_s=0.0),  # [m]
-    "odometry jump": Threshold(on=0.3, off=0.3, for_s=0.0),  # [m] or [rad]
+    "robot restarted": Threshold(on=0.0, off=0.0, for_s=0.6),  # [m]
+    "odometry jump": Threshold(on=0.3, off=0.3, for_s=0.6),  # [m] or [rad]
     "blind lidar": Threshold(on=0.4, off=0.2, for_s=1.0),  # share of rays
     "obstacle not in the model": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
     "obstacle of the model is gone": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
@@ -29,7 +29,7 @@ THRESHOLDS = {
     "track": Threshold(on=0.01, off=0.006, for_s=2.0, until_s=5.0),  # share
     "commands not followed": Threshold(on=0.3, off=0.15, for_s=1.0),  # share
     "late response": Threshold(on=0.25, off=0.15, for_s=2.0),  # [s]
-    "unknown": Threshold(on=1.0, off=0.7, for_s=5.0),  # in units of what is allowed
+    "unknown": Threshold(on=1.0, off=0.7, for_s=8.0),  # in units of what is allowed
 }
 """When each alarm begins and ends; in which unit its number is."""
 
@@ -192,7 +192,7 @@ def _slip(evidence: Evidence) -> Iterator[Finding]:
             f"it turned by {math.degrees(turned):.0f} deg in {times / 2:g} s that its wheels do not tell of"
         )
         yield Finding(cause="wheel slip", number=turned, text=text)
-    elif len(evidence.slipped) > 1:  # a single one may be localisation that errs
+    elif drove:
         text = f"its wheels tell of {drove:.2f} m that it did not drive"
         yield Finding(cause="wheel slip", number=drove, text=text)
 

@@ -51,10 +51,6 @@ class Flow:
         self._messages.append((now_ns, stamp_ns))
         return True
 
-    def hear(self, now_ns: int) -> None:
-        """Take note that something came, though it is of no use."""
-        self.heard_ns = now_ns
-
     def report(self, now_ns: int) -> FlowReport | None:
         """Return how it is now; None: nothing ever came."""
         if self.heard_ns is None:

@@ -36,6 +36,8 @@ _SECOND_NS = 1_000_000_000
 _TURN_NS = 500_000_000
 """Turns are compared over so much time."""
 _STRETCHES = 60
+_STRETCH = (0.6, 1.2)
+"""Of motion, by odometry, over which localisation is compared with it [m], [rad]."""
 _SETTLING_NS = 5_000_000_000
 """So long after a robot was elsewhere, localisation may still be finding it."""
 _FASTEST, _FASTEST_TURN = 5.0, 10.0
@@ -47,7 +49,7 @@ _JUMP, _JUMP_TURN = 0.25, 0.35
 _PAIRED_NS = 60_000_000
 """Scans of the two lidars are compared that are so near in time."""
 _WAITS_NS = 2_000_000_000
-_SLIPPED, _TWISTED = 0.06, 0.04
+_SLIPPED, _TWISTED = 0.1, 0.04
 """Odd stretches are off by that [m], [rad]."""
 _UNSURE, _CONTRARY, _UNSURE_RESIDUAL = 0.6, 0.05, 0.06
 """A robot is not where it is thought to be if less of a scan is explained, and rays of it end both before and
@@ -115,7 +117,8 @@ class DivergenceMonitor:
         self._begin_scans()
 
     def _begin_motion(self) -> None:
-        self._distances, self._turns = Ratios(_STRETCHES, 3.0), Ratios(4 * _STRETCHES, 5.0)
+        self._distances, self._turns = Ratios(_STRETCHES, 3.0), Ratios(4 * _STRETCHES, 5.0, bias=0.01)
+        self._begin_stretch()
         self._nominal_distances, self._nominal_turns = Ratios(_STRETCHES, 3.0), Ratios(_STRETCHES, 5.0)
         self._localised_turns = Ratios(_STRETCHES, 5.0)
         self._waiting: deque[Believed] = deque(maxlen=50)
@@ -143,7 +146,7 @@ class DivergenceMonitor:
     ) -> None:
         """Take the physical robot's odometry, which came at `now_ns`; covariance is ROS's, shape (36,)."""
         if not (all(map(math.isfinite, pose)) and math.isfinite(speed) and math.isfinite(turn)):
-            self._flows["odometry"].hear(now_ns)
+            self._flows["odometry"].take(stamp_ns, now_ns)
             self.invalid(now_ns)
             return
         newer = self._flows["odometry"].take(stamp_ns, now_ns)
@@ -295,6 +298,7 @@ class DivergenceMonitor:
 
     def _compare_motion(self, before: Believed, after: Believed) -> None:
         if not self._is_localised(after.stamp_ns):
+            self._begin_stretch()
             return
         odom = [self._odom.at(one.stamp_ns) for one in (before, after)]
         if odom[0] is None or odom[1] is None:
@@ -307,6 +311,7 @@ class DivergenceMonitor:
         ) > _JUMP_TURN + abs(told.yaw):
             self._found_jump, self._jumped_ns = (after.stamp_ns, apart), after.stamp_ns
             self._nis.clear()
+            self._begin_stretch()
             return
         stated = [
             Believed(stamp_ns=one.stamp_ns, pose=one.pose, covariance=_planar(one.covariance))
@@ -318,21 +323,31 @@ class DivergenceMonitor:
             mean = self._nis.mean
             assert mean is not None
             self._add("nis", mean)
-        self._distances.add(after.stamp_ns, told.x, came.x)
-        self._localised_turns.add(after.stamp_ns, told.yaw, came.yaw)
         virtual = [
             history.at(one.stamp_ns)
             for history in (self._virtual_odom, self._driven)
             for one in (before, after)
         ]
-        if all(virtual):
-            told, came = (
-                a.pose.inverse() @ b.pose
-                for a, b in (virtual[:2], virtual[2:])
-                if a is not None and b is not None
+        places = [place.pose for place in virtual if place is not None]
+        if len(places) < 4:
+            return
+        model = places[0].inverse() @ places[1], places[2].inverse() @ places[3]
+        motions = (told, came, *model)
+        self._stretch += [(motion.x, motion.yaw) for motion in motions]
+        self._way += np.abs([told.x, told.yaw])
+        if np.any(self._way >= _STRETCH):
+            (told_x, told_yaw), (came_x, came_yaw), (model_x, model_yaw), (driven_x, driven_yaw) = (
+                self._stretch
             )
-            self._nominal_distances.add(after.stamp_ns, told.x, came.x)
-            self._nominal_turns.add(after.stamp_ns, told.yaw, came.yaw)
+            self._distances.add(after.stamp_ns, told_x, came_x)
+            self._localised_turns.add(after.stamp_ns, told_yaw, came_yaw)
+            self._nominal_distances.add(after.stamp_ns, model_x, driven_x)
+            self._nominal_turns.add(after.stamp_ns, model_yaw, driven_yaw)
+            self._begin_stretch()
+
+    def _begin_stretch(self) -> None:
+        """Errors of localisation at both ends of a stretch count less the longer it is."""
+        self._stretch, self._way = np.zeros((4, 2)), np.zeros(2)
 
     def _take_turns(self) -> None:
         if not self._gyro or self._odom.latest is None:

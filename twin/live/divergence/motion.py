@@ -1,8 +1,8 @@
 """How far and how much a robot went, as different things tell it, over the last metres.
 
 A wheel of another radius is wrong by the same share of each metre and each turn, another track by that of
-each turn, a wheel that slips by a lot in some of them: so shares come with how sure they are, and with how far
-off single stretches were.
+each turn, a wheel that slips by a lot in some of them: so shares come with how sure they are, and with by how
+much single stretches were off.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.geometry import Array
+
+_FEWEST = 5
+"""Stretches that can tell a ratio."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +44,14 @@ class Stretch:
 class Ratios:
     """Of stretches of a motion in which one thing tells `told`, and a better one `came` [m] or [rad]."""
 
-    def __init__(self, size: int, least: float) -> None:
-        """Remember `size` stretches; a ratio needs `least` of motion told [m] or [rad]."""
+    def __init__(self, size: int, least: float, *, bias: float = 0.0) -> None:
+        """Remember `size` stretches; a ratio needs `least` of motion told [m] or [rad].
+
+        A thing that tells more motion than there is, by about `bias` in each stretch whatever was told, has
+        that estimated, too.
+        """
         self._rows: deque[tuple[int, float, float]] = deque(maxlen=size)
-        self._least = least
+        self._least, self._bias = least, bias
 
     def add(self, stamp_ns: int, told: float, came: float) -> None:
         """Take a stretch that ended at a stamp."""
@@ -65,9 +72,10 @@ class Ratios:
         Args:
             floor: Standard deviation that a stretch has at least [m] or [rad].
         """
-        if len(self._rows) < 8 or self.moved < self._least:
+        if len(self._rows) < _FEWEST or self.moved < self._least:
             return None
         _, told, came = np.array(self._rows).T
+        came = came - self._found_bias(told, came, floor)
         value, stddev = _slope(told, came, floor)
         # Stretches tell as much as they are long.
         grown = np.cumsum(told * told)
@@ -80,6 +88,13 @@ class Ratios:
             value=value, stddev=stddev, drift=two - one, drift_stddev=float(np.hypot(one_sd, two_sd))
         )
 
+    def _found_bias(self, told: Array, came: Array, floor: float) -> float:
+        """Return what is measured without motion, with `_bias` as what is known before."""
+        if not self._bias:
+            return 0.0
+        matrix = np.array([[told @ told, told.sum()], [told.sum(), len(told) + (floor / self._bias) ** 2]])
+        return float(np.linalg.solve(matrix + 1e-9 * np.eye(2), [told @ came, came.sum()])[1])
+
     def odd(self, since_ns: int, least: float) -> list[Stretch]:
         """Return stretches that ended since then, and are off by at least so much [m] or [rad].
 
@@ -89,7 +104,7 @@ class Ratios:
             return []
         rows = np.array(self._rows)
         big = np.abs(rows[:, 1]) >= 0.25 * np.abs(rows[:, 1]).max()
-        usual = float(np.median(rows[big, 2] / rows[big, 1])) if np.any(rows[big, 1]) else 1.0
+        usual = float(np.median(rows[big, 2] / rows[big, 1])) if np.any(rows[:, 1]) else 1.0
         usual = usual if 0.8 < usual < 1.25 else 1.0  # whatever it is then, it is no property of a wheel
         return [
             Stretch(stamp_ns=stamp, told=told, came=came, residual=came - usual * told)

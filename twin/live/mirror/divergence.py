@@ -1,4 +1,4 @@
-"""Tells how a physical robot and its virtual counterpart diverge: `divergence/<series>`, and alarms in words."""
+"""Tells how a physical robot and its virtual counterpart diverge: `divergence/<series>`, alarms in words."""
 
 from __future__ import annotations
 
@@ -41,10 +41,16 @@ _LASTS_NS = 200_000_000
 
 
 class DivergenceNode:
-    """Hears the hardware's topics of both robots, and localisation; `node` is in the virtual one's namespace."""
+    """Hears the hardware's topics of both robots, and localisation."""
 
     def __init__(self, node: Node, stack: RobotStack, tell: Callable[[str, str], None]) -> None:
-        """Hear both robots of a stack; `tell` takes name and text of what begins and ends."""
+        """Hear both robots of a stack.
+
+        Args:
+            node: In the virtual robot's namespace.
+            stack: Of both.
+            tell: Takes name and text of what begins and ends.
+        """
         self.node, self.monitor = node, DivergenceMonitor(self._publish)
         self._tell, self._stack = tell, stack
         self._series = {
