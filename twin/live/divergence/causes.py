@@ -249,7 +249,10 @@ def _response(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _unknown(evidence: Evidence) -> Iterator[Finding]:
-    scan, nis, bound = evidence.scan, evidence.nis, evidence.nis_bound
+    scan, nis, bound, turns = evidence.scan, evidence.nis, evidence.nis_bound, evidence.turns
+    innovation = "the normalised innovation squared is {:.1f}, not 3"
+    if evidence.distances is None and turns is not None and _is_one(turns) and _is_off(turns):
+        innovation += f"; turns come to {_share(turns)} of what odometry believes: by wheel radius or track"
     rows = [
         (evidence.position, _POSITION, "the robots are {:.2f} m apart"),
         (None if evidence.yaw is None else abs(evidence.yaw), _YAW, "one is turned by {:.2f} rad"),
@@ -258,7 +261,7 @@ def _unknown(evidence: Evidence) -> Iterator[Finding]:
             1.0 - _EXPLAINED,
             "{:.0%} of the rays end where nothing was expected",
         ),
-        (nis, _NIS * (bound or 1.0), "the normalised innovation squared is {:.1f}, not 3"),
+        (nis, _NIS * (bound or 1.0), innovation),
     ]
     known = [(number / allowed, text.format(number)) for number, allowed, text in rows if number is not None]
     if known:

@@ -15,7 +15,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from twin.geometry import Array, Pose2, wrap_angle
 
@@ -81,7 +81,7 @@ class NisWindow:
         self._values: deque[float] = deque(maxlen=size)
         tail = (1.0 - probability) / 2.0
         self._bounds = [
-            (float(chi2.ppf(tail, DEGREES * n)) / n, float(chi2.ppf(1.0 - tail, DEGREES * n)) / n)
+            (_chi_squared(tail, DEGREES * n) / n, _chi_squared(1.0 - tail, DEGREES * n) / n)
             for n in range(1, size + 1)
         ]
 
@@ -102,3 +102,8 @@ class NisWindow:
     def bounds(self) -> tuple[float, float] | None:
         """Between which the mean belongs."""
         return self._bounds[len(self._values) - 1] if self._values else None
+
+
+def _chi_squared(probability: float, degrees: int) -> float:
+    """Return the quantile; `scipy.stats` takes long to import."""
+    return 2.0 * float(gammaincinv(degrees / 2.0, probability))
