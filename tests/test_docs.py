@@ -68,7 +68,7 @@ NOT_RUN = {
 }
 """Commands that are shown but not run here, and why."""
 
-GUARD = r"twin guard( -|$)"
+BESIDE = r"twin (guard( -|$)|mirror \w+ --autonomy)"
 """Runs beside the commands that follow, and listens nowhere itself."""
 
 PORT = "7447"
@@ -120,7 +120,7 @@ class Reader:
         (self.folder / block.name).write_text(block.text.replace(PORT, self.port), encoding="utf-8")
 
     def type(self, command: str, output: list[str]) -> None:
-        if "--listen" in command or re.match(GUARD, command):
+        if "--listen" in command or re.match(BESIDE, command):
             self.background.append((self._start(command), output))
             wait_for_listener(self.endpoint)
         else:
@@ -128,7 +128,7 @@ class Reader:
 
     def finish(self) -> None:
         for process, output in self.background:
-            if re.search(rf"examples/|twin plant|{GUARD}", str(process.args)):  # runs until it is stopped
+            if re.search(rf"examples/|twin plant|{BESIDE}", str(process.args)):  # runs until it is stopped
                 process.send_signal(signal.SIGINT)
             self._judge("--listen", process, output)
 

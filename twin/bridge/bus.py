@@ -18,6 +18,7 @@ from twin.bridge.graph import starting_key
 from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
+from twin.bridge.services import Service
 from twin.bridge.topics import Endpoint, Sample, Subscription
 from twin.bridge.topics.in_process import InProcess, Member
 from twin.bridge.topics.link import Carried, Link
@@ -225,6 +226,9 @@ class Bus:
             if self.link is not None and isinstance(receiver, Subscription):
                 heard = Carried(receiver.name, "", arrival.source.sequence, receiver.is_latched, True)
                 self.link.carry(heard, partial(self._enter, arrival))
+            elif self.link is not None and isinstance(receiver, Service):
+                asked = Carried(receiver.name, "", arrival.source.sequence, False, True)
+                self.link.carry_call(asked, partial(self._enter, arrival))
             else:
                 self._enter(arrival)
         return len(arrivals)

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from twin.bridge.bus import Bus
 from twin.bridge.graph import is_hidden
@@ -159,11 +159,15 @@ class LinkDelay(MessageFault):
 
         time: Annotated[Seconds, NotNegative]
         """By how much [s]; nodes hear of it at the first control period after that."""
+        direction: Literal["both", "in", "out"] = "both"
+        """Which messages: what comes from other processes is `in`, what is published here is `out`."""
         jitter: Annotated[Seconds, NotNegative] = 0.0
         """Standard deviation of the delay, which is never negative [s]: messages may pass each other."""
 
     def copies(self, message: Carried) -> Sequence[int]:
         """Hold it back."""
+        if self.config.direction == ("out" if message.sender == "" else "in"):
+            return _AS_IT_IS
         late = self.config.time
         if self.config.jitter:
             late += self.config.jitter * float(self.stream(message).normal(message.sequence, 1)[0])

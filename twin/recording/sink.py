@@ -174,6 +174,13 @@ class RerunSink:
         if take is not None:
             take(sample)
 
+    @staticmethod
+    def shows(msgtype: str) -> bool:
+        """Return whether anything is shown of messages of a type."""
+        from twin.recording.channels.table import SHOWN_TYPES
+
+        return msgtype in SHOWN_TYPES
+
     def on_tick(self, world: World) -> None:
         """Sample the poses when they are due, send the block when it is full, see that it was written.
 

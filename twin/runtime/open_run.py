@@ -85,6 +85,7 @@ class OpenRun:
         viewer: str | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
+        shown: Callable[[RerunSink], Callable[[Sample[Any]], None]] = lambda sink: sink.on_sample,
     ) -> None:
         """Build everything, up to the first tick.
 
@@ -109,6 +110,7 @@ class OpenRun:
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
+            shown: Returns what passes samples on to the recording.
 
         Raises:
             TwinError: The run cannot be made.
@@ -130,7 +132,8 @@ class OpenRun:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        taps = [*taps, *(tap.on_sample for tap in (self._sink, bag_tap) if tap is not None)]
+        taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
+        taps += [] if bag_tap is None else [bag_tap.on_sample]
         network = network or SessionConfig(listen=outside.endpoints(listen))
         # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
         needed = pace is not None or network.networked or workers > 0

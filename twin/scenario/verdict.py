@@ -43,6 +43,8 @@ class Verdict:
     """What users brought, by name: a package and its version, or the hash of a file."""
     cpu: str = ""
     """The class of CPU within which digests can be compared."""
+    label: Literal["model", "shadow", "twin"] = "model"
+    """What the robots are to physical ones, at the end: without one they are a model."""
     test: str = ""
     """Name of the test that the run was, such as `warehouse[seed=3]`; empty if it was none."""
     command: str = ""

@@ -33,7 +33,7 @@ def test_without_a_physical_robot_it_is_a_model() -> None:
         ({"position": 0.3}, "it is 0.30 m from the physical robot"),
         ({"yaw": -0.4}, "it is turned -0.40 rad from the physical robot"),
         ({"clock_bound_s": None}, "the robot's clock is not known"),
-        ({"clock_bound_s": 0.08}, "the robot's clock is known to 80 ms only"),
+        ({"clock_bound_s": 0.13}, "the robot's clock is known to 130 ms only"),
         ({"acknowledged": False, "commands": "not obeyed"}, "not obeyed"),
         ({"doubts": ("two robots",)}, "two robots"),
     ],

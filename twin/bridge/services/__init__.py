@@ -14,6 +14,7 @@ from twin.bridge.qos import QoS
 from twin.bridge.services.future import Future
 from twin.bridge.services.questions import InProcessQuestion, Question, ZenohQuestion
 from twin.bridge.topics import Endpoint
+from twin.bridge.topics.link import Carried
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
@@ -49,6 +50,7 @@ class Service(Endpoint):
         self._requests, self._responses = codecs(srv_type)
         self._callback = callback
         self._open: set[Question] = set()
+        self._answers = 0
         bus = node.bus
         self._admission = Admission(bus.external, self.interface)
         for key in bus.naming.heard(self.interface) if bus.networked else (self.key,):
@@ -89,7 +91,14 @@ class Service(Endpoint):
                     return  # destroyed meanwhile: the client knows
                 raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
             self._open.discard(data)
-            data.reply(self._responses.encode(response), self.node.now_ns)
+            now_ns, link = self.node.now_ns, self.node.bus.link
+            reply = partial(data.reply, self._responses.encode(response), now_ns)
+            if link is None or not external:
+                reply()
+            else:
+                self._answers += 1
+                sender = self.node.fully_qualified_name
+                link.carry_call(Carried(self.name, sender, self._answers, False, True), reply)
 
         self._open.add(data)
         self._callback(request, respond)

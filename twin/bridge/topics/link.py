@@ -24,6 +24,9 @@ class Carried(NamedTuple):
     """Whether somebody listens."""
 
 
+_SENT_AGAIN_NS = 200_000_000
+"""TCP's shortest time-out for sending again, on Linux."""
+
 Stage = Callable[[Carried], Sequence[int]]
 """Returns by how much each copy that arrives is late [ns]: () if none does, (0,) for a message as it is."""
 
@@ -47,10 +50,18 @@ class Link:
         for stage in self.stages:
             delays = [delay + more for delay in delays for more in stage(message)]
         for delay in delays:
-            if delay > 0:
-                heapq.heappush(self._late, (self._clock.now_ns + delay, next(self._count), deliver))
-            else:
-                deliver()
+            self._deliver(delay, deliver)
+
+    def _deliver(self, delay: int, deliver: Callable[[], None]) -> None:
+        if delay > 0:
+            heapq.heappush(self._late, (self._clock.now_ns + delay, next(self._count), deliver))
+        else:
+            deliver()
+
+    def carry_call(self, message: Carried, deliver: Callable[[], None]) -> None:
+        """Deliver a request or a response once: what is lost is sent again, doubles are dropped."""
+        late = sum(min(stage(message), default=_SENT_AGAIN_NS) for stage in self.stages)
+        self._deliver(late, deliver)
 
     def release(self) -> None:
         """Deliver what arrives by now; to be called before nodes run."""

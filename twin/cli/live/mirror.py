@@ -43,6 +43,9 @@ def mirror(
         Path | None,
         typer.Option(metavar="BAG", help="Follow the robots of a bag instead, as fast as can be."),
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Write a recording there, for `twin play`.")
+    ] = None,
     record: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write a bag of all that is heard and said.")
     ] = None,
@@ -54,15 +57,24 @@ def mirror(
         typer.Option(metavar="NAME", help="Command the robot through its `twin guard`, by this node's name."),
     ] = None,
     status: Annotated[
-        bool, typer.Option("--status", help="Print what a mirror that is running tells, and end.")
+        bool,
+        typer.Option(
+            "--status", help="Print what a mirror that is running tells, or told in --bag, and end."
+        ),
     ] = False,
+    at: Annotated[
+        float, typer.Option(metavar="SECONDS", min=0.0, help="When, after the beginning of --bag.")
+    ] = 0.0,
 ) -> None:
     """Keep virtual robots with physical ones of the same names, and tell how far apart they are."""
     if status:
-        _print_status(connect, domain)
+        _print_status(connect, domain, bag, at)
         return
     if scenario is None:
         raise typer.BadParameter("a scenario, or --status", param_hint="SCENARIO")
+    if bag is not None and (autonomy == "all" or guard is not None):
+        said = "a bag obeys no commands; valid with --bag: --autonomy none or localisation, no --guard"
+        raise typer.BadParameter(said)
     from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.wire.interrupts import noted_signals
     from twin.cli.run.options import parse_overrides
@@ -74,7 +86,7 @@ def mirror(
     described = load(scenario, parse_overrides(set or (), seed), execute=True)
     with (
         Mirror(
-            described, _source(bag, connect, domain), autonomy=autonomy, guard=guard, bag=record
+            described, _source(bag, connect, domain), autonomy=autonomy, guard=guard, out=out, bag=record
         ) as robots,
         noted_signals() as received,
         _shown(robots) as show,
@@ -133,10 +145,13 @@ def _shown(robots: Mirror) -> Iterator[Callable[[], None]]:
         yield show
 
 
-def _print_status(connect: list[str] | None, domain: int) -> None:
+def _print_status(connect: list[str] | None, domain: int, bag: Path | None, at: float) -> None:
     from twin.bridge import live
-    from twin.live.mirror.listening import heard_statuses
+    from twin.live.mirror.listening import heard_statuses, past_statuses
     from twin.live.mirror.status_text import status_text
 
+    if bag is not None:
+        typer.echo(status_text(past_statuses(bag, at)))
+        return
     with live.join(connect, domain_id=domain) as process:
         typer.echo(status_text(heard_statuses(process)))

@@ -29,7 +29,7 @@ class LabelConfig:
     """A twin is no farther from the physical robot than that [m]."""
     yaw: float = 0.35
     """It is not turned otherwise by more than that [rad]."""
-    clock_s: float = 0.05
+    clock_s: float = 0.12
     """The robot's clock is known to a twin so well [s]."""
 
 

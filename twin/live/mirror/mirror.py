@@ -12,6 +12,7 @@ from twin.bridge.qos import LATCHED
 from twin.live.mirror.followed_clock import FollowedClock
 from twin.live.mirror.label import Label
 from twin.live.mirror.robot import COMMANDED, MirroredRobot
+from twin.live.mirror.shown import Shown
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status, to_array, worst
 from twin.runtime.open_run import OpenRun
@@ -56,10 +57,12 @@ class Mirror:
         changes: dict[str, object] = {
             "world": scenario.world.model_copy(update={"obstacles": tuple(still)}),
             "faults": (),
+            "checks": (),
             "early_stop": "never",
             "duration": _FOR_EVER_S,
         }
         self.source, self.clock = source, FollowedClock(source.start_ns)
+        shown = Shown(NAMESPACE)
         with ExitStack() as ending:
             ending.callback(source.close)
             self.run = OpenRun(
@@ -70,12 +73,15 @@ class Mirror:
                 pace=source.pace,
                 bag=bag,
                 clock=self.clock,
+                shown=shown.tap,
                 layout=Layout(
                     autonomy=autonomy, hardware=NAMESPACE, commands="" if guard is None else COMMANDED
                 ),
             )
             ending.callback(self.run.close)
             run = self.run.run
+            shown.begin(run.world)
+            run.bus.arrival_taps.append(shown.on_arrival)
             stacks = run.parts.stacks.values()
             self.robots = tuple(
                 MirroredRobot(stack, run.world, held=run.observer.holders, guard=guard) for stack in stacks

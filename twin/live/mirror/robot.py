@@ -18,15 +18,21 @@ from twin.live.guard.gate import Velocity
 from twin.live.guard.verdict import Verdict
 from twin.live.mirror.divergence import DivergenceNode
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
+from twin.live.mirror.holding import Holding
 from twin.live.mirror.label import Evidence, LabelConfig, judge
 from twin.live.mirror.obedience import Obedience
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status
+from twin.live.mirror.told import Told
 from twin.nodes.messages import pose_stamped
 from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World
 
 _PENDING = 200
+_PRESSES_N = 10.0
+"""A gripper whose drive exerts more holds something."""
+_SQUEEZE = 0.1
+"""The virtual one then closes by so much more [m] than fits, as hard as the physical one."""
 _STUCK = 0.06
 """A virtual robot that is so far from the physical one [m], and touches something, may be held by it ..."""
 _STUCK_TICKS = 5
@@ -37,7 +43,7 @@ COMMANDED = "commanded"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
+class Event:
     """Something that happened, for whoever watches."""
 
     stamp_ns: int
@@ -76,7 +82,7 @@ class MirroredRobot:
         """The latest, before it was corrected."""
         self.heard_ns: int | None = None
         """When the latest data came, by the robot's clock."""
-        self.events: list[Told] = []
+        self.events: list[Event] = []
         self._world, self._held = world, held
         self._stepped_ns: int | None = None
         localisation = context.config.localisation
@@ -89,6 +95,10 @@ class MirroredRobot:
         self._latest_ns = -1
         self._physical: Pose2 | None = None
         self._joints: dict[str, float] = {}
+        self._grip = stack.manipulator.gripper_joint if stack.manipulator is not None else None
+        self._grip_N = 0.0
+        """What the physical gripper's drive exerts."""
+        self._holding = Holding()
         commands = stack.handle.description.commands
         self._positions = {name for name, command in commands.items() if command.interface == "position"}
         space = context.namespace
@@ -105,6 +115,7 @@ class MirroredRobot:
         if guard is not None:
             self.guard = GuardClient(node, guard=f"{space}/{guard}", monotonic_ns=time.perf_counter_ns)
             node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
+        self.told = Told(node, space)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
         self.divergence = DivergenceNode(node, stack, self.tell)
         node.create_task(self._run())
@@ -131,8 +142,10 @@ class MirroredRobot:
             virtual=self._world.pose(self.stack.handle.base).to_pose2(),
             physical=self._physical,
             clock_offset_s=source.clock_offset_s,
+            delay_s=self.told.delay_s,
             resets=self.follower.resets,
             alarms=self.divergence.words,
+            told=dict(self.told.words),
         )
 
     def forget(self) -> None:
@@ -166,12 +179,30 @@ class MirroredRobot:
         motion = moved @ virtual.inverse()
         if motion.distance(Pose2(0.0, 0.0, 0.0)) > 0.0 or motion.yaw != 0.0:
             world.shift(base, motion)
-            for good, robot in self._held().items():
-                if robot == self.stack.name:
-                    world.shift(good, motion)
-        for joint, position in self._joints.items():
-            self.stack.handle.hardware.command(joint, position)
+            for good in self._carried():
+                world.shift(good, motion)
+        self._follow_joints()
         self._pose.publish(pose_stamped(moved, _WORLD, now_ns))
+
+    def _carried(self) -> list[str]:
+        return [good for good, robot in self._held().items() if robot == self.stack.name]
+
+    def _follow_joints(self) -> None:
+        """Let joints moved by position be where the physical ones are, and the gripper press as hard."""
+        hardware = self.stack.handle.hardware
+        for joint, position in self._joints.items():
+            if joint != self._grip:
+                hardware.command(joint, position)
+                continue
+            presses = abs(self._grip_N) > _PRESSES_N
+            hardware.limit_effort(joint, abs(self._grip_N) if presses else math.inf)
+            hardware.command(joint, position + math.copysign(_SQUEEZE, self._grip_N) if presses else position)
+            carried = self._carried()
+            text = self._holding.update(
+                self.node.now_ns, physical=presses, virtual=carried[0] if carried else None
+            )
+            if text is not None:
+                self.tell("grip", text)
 
     def _let_through(self) -> None:
         """Take away what stops the virtual robot where the physical one goes on."""
@@ -209,6 +240,7 @@ class MirroredRobot:
             if stamp_ns <= self._latest_ns:
                 continue  # repeated, or overtaken
             self._latest_ns = stamp_ns
+            self.told.late((self.node.now_ns - stamp_ns) * 1e-9)
             T_world_odom = self._T_world_odom()
             if T_world_odom is not None:
                 self._pending.append((stamp_ns, T_world_odom @ pose))
@@ -222,6 +254,9 @@ class MirroredRobot:
         for name, position in zip(message.name, message.position, strict=False):
             if name in self._positions and math.isfinite(position):
                 self._joints[name] = position
+        for name, effort in zip(message.name, message.effort, strict=False):
+            if name == self._grip and math.isfinite(effort):
+                self._grip_N = effort
 
     def _send(self, message: Twist) -> None:
         assert self.guard is not None
@@ -267,7 +302,7 @@ class MirroredRobot:
 
     def tell(self, what: str, text: str) -> None:
         """Note an event, and log it."""
-        self.events.append(Told(stamp_ns=self.node.now_ns, what=what, text=text))
+        self.events.append(Event(stamp_ns=self.node.now_ns, what=what, text=text))
         self.node.get_logger().warn(f"{what}: {text}")
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Self
 
 from twin.bridge.msgs import DiagnosticArray, DiagnosticStatus, KeyValue, header
@@ -14,6 +14,8 @@ from twin.live.mirror.label import LABELS, Evidence, Judgement, Label
 _NAME = "twin: "
 _LEVELS: dict[Label, int] = {"twin": 0, "shadow": 1, "model": 2}
 """OK, WARN, ERROR of diagnostic_msgs."""
+_TOLD = "told "
+_DELAY = ("delay_s", "jitter_s")
 _NUMBERS = ("age_s", "position", "yaw", "clock_bound_s")
 
 
@@ -30,6 +32,10 @@ class Status:
     """Likewise, where it was seen last."""
     clock_offset_s: float | None
     """The robot's clock minus this computer's [s]."""
+    delay_s: tuple[float, float] | None = None
+    """How late data of the robot come, and how far nine of ten are from that, by its clock [s]."""
+    told: Mapping[str, str] = field(default_factory=dict)
+    """What the robot tells of itself: `mission`, `battery`."""
     resets: int
     """How often the virtual robot was put elsewhere at once."""
     alarms: tuple[str, ...] = ()
@@ -43,11 +49,13 @@ class Status:
         if self.physical is not None:
             values |= {f"physical_{name}": value for name, value in self.physical._asdict().items()}
         values |= {"clock_offset_s": self.clock_offset_s, "resets": self.resets}
+        values |= dict(zip(_DELAY, self.delay_s or (None, None), strict=True))
         entries = [
             KeyValue(key=key, value="" if value is None else f"{value:.6g}") for key, value in values.items()
         ]
         entries.append(KeyValue(key="acknowledged", value=str(evidence.acknowledged).lower()))
         entries.append(KeyValue(key="commands", value=evidence.commands))
+        entries += [KeyValue(key=f"{_TOLD}{key}", value=value) for key, value in self.told.items()]
         entries += [KeyValue(key="alarm", value=alarm) for alarm in self.alarms]
         why = "; ".join(self.judgement.why)
         return DiagnosticStatus(
@@ -67,6 +75,7 @@ class Status:
         told = {entry.key: entry.value for entry in message.values}
         alarms = tuple(entry.value for entry in message.values if entry.key == "alarm")
         numbers = {key: _number(value) for key, value in told.items()}
+        delay, jitter = (numbers.get(name) for name in _DELAY)
         virtual = [numbers.get(f"virtual_{name}") for name in Pose2._fields]
         physical = [numbers.get(f"physical_{name}") for name in Pose2._fields]
         return cls(
@@ -83,6 +92,8 @@ class Status:
             virtual=Pose2(*(math.nan if value is None else value for value in virtual)),
             physical=None if None in physical else Pose2(*(value or 0.0 for value in physical)),
             clock_offset_s=numbers.get("clock_offset_s"),
+            delay_s=None if delay is None or jitter is None else (delay, jitter),
+            told={key.removeprefix(_TOLD): value for key, value in told.items() if key.startswith(_TOLD)},
             resets=int(numbers.get("resets") or 0),
             alarms=alarms,
         )

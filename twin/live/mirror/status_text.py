@@ -29,6 +29,10 @@ def _block(status: Status) -> str:
         bound = evidence.clock_bound_s
         known = "" if bound is None else f", known to {1e3 * bound:.1f} ms"
         lines.append(f"  clock       {status.clock_offset_s:+.4f} s from ours{known}")
+    if status.delay_s is not None:
+        delay, jitter = status.delay_s
+        lines.append(f"  link        data come {1e3 * delay:.0f} ms late, within {1e3 * jitter:.0f} ms")
+    lines += [f"  {name:<11} {words}" for name, words in status.told.items()]
     lines.append(f"  commands    {evidence.commands}")
     if status.resets:
         times = "once" if status.resets == 1 else f"{status.resets} times"

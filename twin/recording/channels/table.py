@@ -30,6 +30,7 @@ _BY_NAME: dict[tuple[str, str], type[Any]] = {
     ("joint_states", "sensor_msgs/msg/JointState"): JointChannel,
     ("tf", "tf2_msgs/msg/TFMessage"): BeliefChannel,
     ("mission/state", "std_msgs/msg/String"): StateChannel,
+    ("mission/label", "std_msgs/msg/String"): StateChannel,
 }
 
 SHOWN_TYPES = frozenset(_BY_TYPE) | {msgtype for _, msgtype in _BY_NAME}

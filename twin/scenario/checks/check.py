@@ -118,6 +118,8 @@ class BaseMotion:
 
     def take(self, pose: Pose3) -> None:
         """Take the true pose of the base."""
+        if self.seen:
+            return
         here = pose.to_pose2()
         self._start = start = self._start or here
         if start.distance(here) > _MOVED or abs(wrap_angle(here.yaw - start.yaw)) > _TURNED:

@@ -32,7 +32,7 @@ class Predicate:
         Texts and truth values have no distance: what is equal, or is not, is so by infinity.
         """
         limit, relation = self.limit, self.relation
-        if isinstance(limit, str | bool) or isinstance(value, str):
+        if isinstance(limit, (str, bool)) or isinstance(value, str):
             return math.inf if (value == limit) == (relation == "==") else -math.inf
         if value == limit:  # also where both are infinite
             return TINIEST if "=" in relation and relation != "!=" else -TINIEST

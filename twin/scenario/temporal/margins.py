@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from operator import itemgetter
 from typing import NamedTuple
 
 TINIEST = math.ulp(0.0)
@@ -33,12 +34,16 @@ class Margin(NamedTuple):
         return None if math.isinf(self.size) else 0.0 if abs(self.size) == TINIEST else self.size
 
     def __neg__(self) -> Margin:
-        return self._replace(size=-self.size)
+        return Margin(-self.size, self.at_ns, self.predicate, self.value)
+
+
+SIZE = itemgetter(0)
+"""Returns a margin's size."""
 
 
 def lowest(margins: Iterable[Margin]) -> Margin:
     """Return the smallest one, the first of equal ones."""
-    return min(margins, key=lambda margin: margin.size)
+    return min(margins, key=SIZE)
 
 
 UNKNOWN = (Margin(-math.inf, 0, -1), Margin(math.inf, 0, -1))

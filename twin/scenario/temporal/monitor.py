@@ -8,17 +8,10 @@ from typing import NamedTuple
 
 from twin.scenario.temporal import formula as stl
 from twin.scenario.temporal.formula import FOREVER, Formula, Predicate, Value, Window
-from twin.scenario.temporal.margins import UNKNOWN, Margin, lowest
+from twin.scenario.temporal.margins import SIZE, UNKNOWN, Margin, lowest
 
-
-class Segment(NamedTuple):
-    """A margin over a span of time."""
-
-    begin: int
-    """[ns]"""
-    end: int
-    """Not in it any more [ns]."""
-    margin: Margin
+Change = tuple[int, Margin]
+"""From when on [ns] there is which margin."""
 
 
 class _Node(ABC):
@@ -26,25 +19,25 @@ class _Node(ABC):
 
     def __init__(self, asked: Window) -> None:
         self.asked = asked
-        self.ready: deque[Segment] = deque()
-        """What is known and not taken yet: unbroken, from the first moment asked for."""
+        self.changes: deque[Change] = deque()
+        """What is found and not taken yet; the first one of all is at the first moment asked for."""
+        self.known = 0
+        """Up to, not including, when all changes are found [ns]."""
+        self._last: Margin | None = None
 
-    def _found(self, begin: int, end: int, margin: Margin) -> None:
-        """Add what is known of a span, as far as somebody asks."""
-        begin, end = max(begin, self.asked.low), min(end, self.asked.high + 1)
-        if begin >= end:
-            return
-        if self.ready and self.ready[-1].margin == margin:
-            begin = self.ready.pop().begin
-        self.ready.append(Segment(begin, end, margin))
+    def _found(self, begin: int, margin: Margin) -> None:
+        """Add what is found to be so from a moment on, if somebody asks."""
+        if margin != self._last and begin <= self.asked.high:
+            self._last = margin
+            self.changes.append((begin, margin))
 
     @abstractmethod
     def work(self) -> None:
-        """Find what can be found of what the parts have ready."""
+        """Find what can be found of what the parts have found."""
 
     def bounds(self) -> tuple[Margin, Margin]:
         """Return between which the margin lies, of a node of which a single moment is asked for."""
-        return (self.ready[0].margin, self.ready[0].margin) if self.ready else self._so_far()
+        return (self.changes[0][1], self.changes[0][1]) if self.changes else self._so_far()
 
     def _so_far(self) -> tuple[Margin, Margin]:
         return UNKNOWN
@@ -57,23 +50,30 @@ class _Leaf(_Node):
         super().__init__(asked)
         self.predicate, self._index = predicate, index
         self._margin: Margin | None = None
-        self._known = 0
+        self._since = asked.low
+        """Since when there is that margin, the first value being that of all times before, too."""
+        self._is_new = False
+        """Whether that is not found yet: another value may come at that moment, or before somebody asks."""
 
     def take(self, time_ns: int, value: Value) -> None:
         """Take a value that the signal has from a moment on."""
         self.know(time_ns)
         size = self.predicate.margin(value)
         if self._margin is None or self._margin.size != size:  # of equal ones the first is the worst moment
-            self._margin = Margin(size, time_ns, self._index, value)
+            if self._margin is not None:
+                self._since = max(time_ns, self.asked.low)
+            self._margin, self._is_new = Margin(size, time_ns, self._index, value), True
 
     def know(self, until_ns: int) -> None:
         """Note that the last value lasts at least up to, not including, a moment."""
-        if self._margin is not None and until_ns > self._known:
-            self._found(self._known, until_ns, self._margin)
-            self._known = until_ns
+        if self._margin is not None and until_ns > self.known:
+            self.known = until_ns
+            if self._is_new and until_ns > self._since:
+                self._is_new = False
+                self._found(self._since, self._margin)
 
     def work(self) -> None:
-        """What is known is ready."""
+        """What is known is found."""
 
 
 class _Not(_Node):
@@ -82,10 +82,12 @@ class _Not(_Node):
         self._part = part
 
     def work(self) -> None:
-        self._part.work()
-        while self._part.ready:
-            begin, end, margin = self._part.ready.popleft()
-            self._found(begin, end, -margin)
+        part = self._part
+        part.work()
+        while part.changes:
+            begin, margin = part.changes.popleft()
+            self._found(begin, -margin)
+        self.known = part.known
 
     def _so_far(self) -> tuple[Margin, Margin]:
         low, high = self._part.bounds()
@@ -96,12 +98,14 @@ class _And(_Node):
     def __init__(self, parts: list[_Node]) -> None:
         super().__init__(parts[0].asked)
         self._parts = parts
+        self._now = [UNKNOWN[0]] * len(parts)
 
     def work(self) -> None:
         for part in self._parts:
             part.work()
-        for begin, end, margins in _aligned(self._parts):
-            self._found(begin, end, lowest(margins))
+        self.known = min([part.known for part in self._parts])
+        while (begin := _take_next(self._parts, self._now, self.known)) < FOREVER:
+            self._found(begin, lowest(self._now))
 
     def _so_far(self) -> tuple[Margin, Margin]:
         bounds = [part.bounds() for part in self._parts]
@@ -109,38 +113,40 @@ class _And(_Node):
 
 
 class _Always(_Node):
-    """The least margin of a window that slides: a monotonic queue, each segment enters and leaves once."""
+    """The least margin of a window that slides: a monotonic queue, each change enters and leaves once."""
 
     def __init__(self, part: _Node, window: Window, asked: Window) -> None:
         super().__init__(asked)
         self._part, self._window = part, window
         self._next = asked.low
         self._last_left = _plus(asked.high, window.low)
-        self._least: deque[Segment] = deque()
-        """For windows up to now: over which left ends which margin is the least; they grow."""
+        self._least: deque[Change] = deque()
+        """For windows up to now: from which left end on which margin is the least; they grow."""
 
     def work(self) -> None:
-        self._part.work()
-        while self._part.ready:
-            self._slide(self._part.ready.popleft())
+        part, least = self._part, self._least
+        part.work()
+        while part.changes:
+            begin, margin = part.changes.popleft()
+            self._slide(begin)
+            while least and least[-1][1].size > margin.size:
+                begin = least.pop()[0]
+            if not least or begin <= self._last_left:
+                least.append((begin, margin))
+        self._slide(part.known)
 
-    def _slide(self, new: Segment) -> None:
-        least, low, high = self._least, self._window.low, self._window.high
-        begin, end, margin = new
-        while least and least[-1].margin.size > margin.size:
-            begin = least.pop().begin
-        if not least or least[-1].end <= self._last_left:
-            least.append(Segment(begin, end, margin))
-        known = FOREVER if end == FOREVER or end > self._part.asked.high else end - high
-        while self._next < known:
-            while least[0].end <= self._next + low:
+    def _slide(self, until: int) -> None:
+        """Find the margins of windows that end before a moment."""
+        least, low = self._least, self._window.low
+        self.known = FOREVER if _is_last(until, self._part) else until - self._window.high
+        while self._next < self.known:
+            while len(least) > 1 and least[1][0] <= self._next + low:
                 least.popleft()
-            until = known if len(least) == 1 else min(known, least[0].end - low)
-            self._found(self._next, until, least[0].margin)
-            self._next = until
+            self._found(self._next, least[0][1])
+            self._next = self.known if len(least) == 1 else min(self.known, least[1][0] - low)
 
     def _so_far(self) -> tuple[Margin, Margin]:
-        return UNKNOWN[0], self._least[0].margin if self._least else UNKNOWN[1]
+        return UNKNOWN[0], self._least[0][1] if self._least else UNKNOWN[1]
 
 
 class _Finally(_Node):
@@ -151,11 +157,13 @@ class _Finally(_Node):
         self._part = part
 
     def work(self) -> None:
-        self._part.work()
-        while self._part.ready:
-            _, end, margin = self._part.ready.popleft()
-            if end == FOREVER:
-                self._found(self.asked.low, FOREVER, margin)
+        part = self._part
+        part.work()
+        while len(part.changes) > 1:
+            part.changes.popleft()
+        if part.known == FOREVER:
+            self.known = FOREVER
+            self._found(self.asked.low, part.changes[0][1])
 
 
 class _Open(NamedTuple):
@@ -174,26 +182,41 @@ class _Until(_Node):
 
     def __init__(self, first: _Node, then: _Node, span: int, asked: Window) -> None:
         super().__init__(asked)
-        self._first, self._then, self._span = first, then, span
+        self._parts, self._span = [first, then], span
+        self._now = [UNKNOWN[0]] * 2
+        self._met = UNKNOWN
+        """The margins of the moments from `_next` on."""
+        self._next = asked.low
         self._open: deque[_Open] = deque()
 
     def work(self) -> None:
-        self._first.work()
-        self._then.work()
-        for begin, end, (first, then) in _aligned([self._first, self._then]):
-            self._advance(begin, end, first, then)
+        for part in self._parts:
+            part.work()
+        until = min([part.known for part in self._parts])
+        while (begin := _take_next(self._parts, self._now, until)) < FOREVER:
+            self._advance(begin)
+            self._meet(*self._now)
+        self._advance(until)
 
-    def _advance(self, begin: int, end: int, first: Margin, then: Margin) -> None:
+    def _meet(self, first: Margin, then: Margin) -> None:
+        """Let open moments see the margins of the next one."""
+        self._met = first, then
         was, self._open = self._open, deque()
         for one in was:
-            best = max(one.best, lowest((one.first, then)), key=_size)
+            best = max(one.best, lowest((one.first, then)), key=SIZE)
             self._keep(_Open(one.begin, one.end, best, lowest((one.first, first))))
-        if begin <= self.asked.high:
-            self._keep(_Open(begin, min(end, self.asked.high + 1), then, first))
-        over = FOREVER if end == FOREVER or end > self._then.asked.high else end - self._span
+
+    def _advance(self, until: int) -> None:
+        """Let the margins last up to a moment, and find those of moments whose window ends before."""
+        if self._next < until:
+            if self._next <= self.asked.high:
+                first, then = self._met
+                self._keep(_Open(self._next, min(until, self.asked.high + 1), then, first))
+            self._next = until
+        self.known = over = FOREVER if _is_last(until, self._parts[1]) else until - self._span
         while self._open and self._open[0].begin < over:
             one = self._open.popleft()
-            self._found(one.begin, min(one.end, over), one.best)
+            self._found(one.begin, one.best)
             if one.end > over:
                 self._open.appendleft(one._replace(begin=over))
 
@@ -207,7 +230,7 @@ class _Until(_Node):
         if not self._open:
             return UNKNOWN
         one = self._open[0]
-        return one.best, max(one.best, one.first, key=_size)
+        return one.best, max(one.best, one.first, key=SIZE)
 
 
 class Monitor:
@@ -223,8 +246,11 @@ class Monitor:
         """What `Margin.predicate` counts."""
         self._leaves: dict[str, list[_Leaf]] = {}
         self._root = self._made(formula, Window(0, 0))
+        self._every_leaf = [leaf for leaves in self._leaves.values() for leaf in leaves]
         self.bounds: tuple[Margin, Margin] = UNKNOWN
         """Between which the margin lies, whatever comes."""
+        self._settled = False
+        """Whether that is one."""
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -239,18 +265,19 @@ class Monitor:
 
     def take(self, signal: str, time_ns: int, value: Value) -> None:
         """Take a value that a signal has from a moment on; of several at one moment the last counts."""
-        for leaf in self._leaves[signal]:
-            leaf.take(time_ns, value)
+        if not self._settled:
+            for leaf in self._leaves[signal]:
+                leaf.take(time_ns, value)
 
     def know(self, until_ns: int) -> None:
         """Judge, all being known up to, not including, a moment."""
-        if self.bounds[0].size == self.bounds[1].size:
+        if self._settled:
             return
-        for leaves in self._leaves.values():
-            for leaf in leaves:
-                leaf.know(until_ns)
+        for leaf in self._every_leaf:
+            leaf.know(until_ns)
         self._root.work()
-        self.bounds = self._root.bounds()
+        low, high = self.bounds = self._root.bounds()
+        self._settled = low.size == high.size
 
     def finish(self) -> Margin | None:
         """Return the margin, the run being over; None if a signal never had a value."""
@@ -293,18 +320,23 @@ class Monitor:
         return _And([made, before])
 
 
-def _aligned(nodes: list[_Node]) -> list[tuple[int, int, list[Margin]]]:
-    """Take what all nodes have ready, cut where one of them changes."""
-    cut = []
-    while all(node.ready for node in nodes):
-        begin = max(node.ready[0].begin for node in nodes)
-        end = min(node.ready[0].end for node in nodes)
-        cut.append((begin, end, [node.ready[0].margin for node in nodes]))
-        for node in nodes:
-            segment = node.ready.popleft()
-            if segment.end > end:
-                node.ready.appendleft(segment._replace(begin=end))
-    return cut
+def _take_next(nodes: list[_Node], now: list[Margin], known: int) -> int:
+    """Take the next change into `now`; return its moment, FOREVER if not all nodes know of one."""
+    begin = known
+    for node in nodes:
+        if node.changes and node.changes[0][0] < begin:
+            begin = node.changes[0][0]
+    if begin >= known:
+        return FOREVER
+    for i, node in enumerate(nodes):
+        if node.changes and node.changes[0][0] == begin:
+            now[i] = node.changes.popleft()[1]
+    return begin
+
+
+def _is_last(until: int, part: _Node) -> bool:
+    """Whether nobody asks for a part's margin after a moment."""
+    return until == FOREVER or until > part.asked.high
 
 
 def _later(asked: Window, window: Window) -> Window:
@@ -314,7 +346,3 @@ def _later(asked: Window, window: Window) -> Window:
 
 def _plus(one: int, other: int) -> int:
     return min(FOREVER, one + other)
-
-
-def _size(margin: Margin) -> float:
-    return margin.size

@@ -1,0 +1,39 @@
+"""`twin mirror` from a shell; what it does beside a robot: tests/live/mirror."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.cli.conftest import Invoke
+from twin.bridge.wire.session import SessionConfig
+from twin.live.plant import Plant
+from twin.scenario.schema import load
+
+
+def test_a_bag_is_followed_recorded_and_asked_for_the_past(invoke: Invoke, tmp_path: Path) -> None:
+    bag, own = tmp_path / "bag", tmp_path / "own"
+    network = SessionConfig()
+    with Plant(load("diff_bot_figure8"), network=network, autonomy=True, pace=None, bag=bag) as robots:
+        world = robots.run.run.world
+        robots.advance(lambda: world.time_ns >= 3e9)
+    code, output, error = invoke("mirror", "diff_bot_figure8", "--bag", bag, "--record", own)
+    assert code == 0
+    assert [line.partition(": ")[2] for line in error.splitlines()] == ["model", "shadow"]
+    assert output.startswith("diff_bot  SHADOW\n")
+    code, output, _ = invoke("mirror", "--status", "--bag", own, "--at", 2)
+    assert code == 0
+    assert output.startswith("diff_bot  SHADOW\n")
+    assert "  because     a bag obeys no commands\n" in output
+
+
+def test_mistakes_are_a_sentence(invoke: Invoke, tmp_path: Path) -> None:
+    for words, said in (
+        (("--seed", "1"), "a scenario, or --status"),
+        (("diff_bot_figure8", "--bag", tmp_path, "--autonomy", "all"), "a bag obeys no commands"),
+        (("diff_bot_figure8", "--bag", tmp_path / "none"), "cannot be read"),
+        (("diff_bot_figure8", "--connect", "tcp/127.0.0.1:1"), "tcp/127.0.0.1:1"),
+        (("no_such",), "no_such"),
+    ):
+        code, _, error = invoke("mirror", *words)
+        assert code == 2
+        assert said in " ".join(error.split())
