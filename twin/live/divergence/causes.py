@@ -23,7 +23,7 @@ THRESHOLDS = {
     "blind lidar": Threshold(on=0.4, off=0.2, for_s=1.0),  # share of rays
     "obstacle not in the model": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
     "obstacle of the model is gone": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
-    "kidnapped": Threshold(on=0.4, off=0.15, for_s=0.8),  # share of rays
+    "kidnapped": Threshold(on=0.4, off=0.15, for_s=0.3),  # share of rays
     "wheel slip": Threshold(on=0.06, off=0.03, for_s=0.4, until_s=5.0),  # [m] or [rad]
     "wheel radius": Threshold(on=0.01, off=0.006, for_s=2.0, until_s=5.0),  # share
     "track": Threshold(on=0.01, off=0.006, for_s=2.0, until_s=5.0),  # share

@@ -294,7 +294,8 @@ class DivergenceMonitor:
         latest = self._matches[-1]
         unsure = (stamp for stamp in (self._unsure_ns, self._jumped_ns) if stamp is not None)
         settled = all(stamp_ns - stamp > _SETTLING_NS for stamp in unsure)
-        return settled and latest.returned >= _LEAST_RETURNED and not self._frozen
+        sees = latest.returned >= _LEAST_RETURNED * latest.expected  # in the open there is nothing to see
+        return settled and sees and not self._frozen
 
     def _compare_motion(self, before: Believed, after: Believed) -> None:
         if not self._is_localised(after.stamp_ns):
