@@ -50,7 +50,7 @@ TABLE = {
     "sweep": Command(_SCENARIOS, "Run a scenario with many values and seeds, and say how sure its pass rate is.", "experiments.sweep", "sweep", "twin sweep diff_bot_figure8 --seeds 0:100 --set mission.steps.0.linear=0.1:0.3:0.1", needs_arguments=True),
     "report": Command(_SCENARIOS, "Write a page of a run, or of many: verdict, path, speeds, worst moments, pictures.", "experiments.report", "report", "twin report runs/warehouse/20261121-101500 -o report.html", needs_arguments=True),
     "plant": Command(_SCENARIOS, "Run a scenario's robots in real time as if they were hardware.", "live.plant", "plant", "twin plant warehouse --perturb wheel_radius=0.97,latency=80ms,clock_offset=0.4s", needs_arguments=True),
-    "mirror": Command(_SCENARIOS, "Keep virtual robots with physical ones, and tell how far apart they are.", "live.mirror", "mirror", "twin mirror warehouse --autonomy all", needs_arguments=True),
+    "mirror": Command(_SCENARIOS, "Keep virtual robots with physical ones of the same names, and tell how far apart they are.", "live.mirror", "mirror", "twin mirror warehouse --autonomy all", needs_arguments=True),
     "play": Command(_SCENARIOS, "Open a recording in the Rerun viewer.", "play", "play", "twin play runs/warehouse/20261121-101500", needs_arguments=True),
     "new": Command(_SCENARIOS, "Write a small project that runs as it is: a robot, an arena, a scenario, a check, a test, a CI file.", "new", "new", "twin new my_robot", needs_arguments=True),
     "scenarios": Command(_SCENARIOS, "List the scenarios that `twin run` knows by name: those in the folder `scenarios`, and shipped ones.", "listings", "scenarios", "twin scenarios"),
