@@ -28,7 +28,7 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, environments of gymnasium to theirs, a conversion to MuJoCo's compilation, messages to a put, a sweep to its runs in turn; memory
+bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, environments of gymnasium to theirs, a conversion to MuJoCo's compilation, messages to a put, a sweep to its runs in turn, eight futures to one; memory
 	$(BIN)/python -m benchmarks.measures.start_cost
 	$(BIN)/python -m benchmarks.measures.convert_cost
 	$(BIN)/python -m benchmarks.measures.run_cost
@@ -38,6 +38,7 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to 
 	$(BIN)/python -m benchmarks.measures.lockstep_cost
 	$(BIN)/python -m benchmarks.measures.tracking
 	$(BIN)/python -m benchmarks.measures.sweep_cost
+	$(BIN)/python -m benchmarks.measures.futures_cost
 
 soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory; a million steps of environments
 	$(BIN)/python -m benchmarks.measures.soak

@@ -61,6 +61,7 @@ NOT_RUN = {
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
     r"python examples/learning/learn_goal\.py .*": "takes minutes: tests/examples learns less",
     r"twin bench slam .*": "needs logs that are not shipped: tests/benchmarks/slam has its own",
+    r"twin fork .*|twin run warehouse --pace 1 --listen .*": "need each other: tests/live/futures has both",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",
     r"twin bench .*": "needs ../shared/data: tests/benchmarks has small ones",

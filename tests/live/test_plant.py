@@ -40,7 +40,7 @@ def drive(robots: Plant, seconds: float, speed: float | None = None) -> dict[str
         commands = node.create_publisher(Twist, "/cmd_vel", 10)
         message = new(Twist)
         message.linear.x = speed
-        node.create_timer(0.05, lambda: commands.publish(message))
+        node.create_timer(50_000_000, lambda: commands.publish(message))
     world = robots.run.run.world
     robots.advance(lambda: world.time_ns >= seconds * 1e9)
     return heard
@@ -92,7 +92,7 @@ def test_without_commands_it_stops_by_itself() -> None:
         commands = node.create_publisher(Twist, "/cmd_vel", 10)
         message = new(Twist)
         message.linear.x = 0.4
-        node.create_timer(0.05, lambda: world.time_ns < 1e9 and commands.publish(message))
+        node.create_timer(50_000_000, lambda: world.time_ns < 1e9 and commands.publish(message))
         robots.advance(lambda: world.time_ns >= 1e9)
         assert heard[-1].twist.twist.linear.x > 0.3
         robots.advance(lambda: world.time_ns >= 2.5e9)

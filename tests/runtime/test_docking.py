@@ -11,7 +11,7 @@ from tests.runtime.conftest import MakeRun
 from twin.geometry import wrap_angle
 from twin.scenario.schema import load
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("docking")]
+pytestmark = pytest.mark.slow
 
 ARENA = """
 name: hall

@@ -60,6 +60,7 @@ class Simulation(Participant):
         wait_for: Sequence[str] = (),
         wait_timeout: float = 10.0,
         free: bool = False,
+        keep_inputs: bool = False,
         on_execute: Callable[[str], None] | None = None,
     ) -> None:
         """Prepare a run; nothing is read or opened yet.
@@ -83,6 +84,7 @@ class Simulation(Participant):
             wait_for: Nodes and topics of other processes with which the run is in lock-step.
             wait_timeout: How long to wait for their answers [s] of wall time.
             free: Whether others take part at their own pace; not deterministic.
+            keep_inputs: Whether what comes from outside is kept, for snapshots (`twin fork --save`).
             on_execute: Called with the name of each file or module of a user's plugins before it is executed.
 
         Raises:
@@ -99,7 +101,7 @@ class Simulation(Participant):
         self._bag, self._bag_hidden_topics = bag, bag_hidden_topics
         self._save_model = None if save_model is None else Path(save_model)
         self._pace = pace
-        self._workers = workers
+        self._workers, self._keep_inputs = workers, keep_inputs
         self._listen, self._network = tuple(listen), network
         self._outside = partial(
             Outside, nodes=tuple(nodes), wait_for=tuple(wait_for), wait_timeout_s=wait_timeout, free=free
@@ -288,6 +290,11 @@ class Simulation(Participant):
             workers=self._workers,
         )
         self._held.callback(self._run.close)
+        if self._clock == "free" and not self._workers:
+            from twin.live.futures.inputs import Inputs
+            from twin.live.futures.node import FuturesNode
+
+            FuturesNode(self._run, Inputs(self._run) if self._keep_inputs else None)
 
     def _hold(self, folder: Path) -> None:
         """Take the folder of the results; a verdict of an earlier run there must not pass for this one's."""

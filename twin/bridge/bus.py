@@ -19,6 +19,7 @@ from twin.bridge.node import Node
 from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
 from twin.bridge.services import Service
+from twin.bridge.services.questions import ZenohQuestion
 from twin.bridge.topics import Endpoint, Sample, Subscription
 from twin.bridge.topics.in_process import InProcess, Member
 from twin.bridge.topics.link import Carried, Link
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from twin.bridge.actions.client import ActionClient, ClientGoal
 
 _EXTERNAL_DEPTH = 10_000
+_left: list[Any] = []
+"""What Zenoh made in the process of which this one is a fork."""
 
 Tap = Callable[[Sample[Any]], None]
 
@@ -47,6 +50,8 @@ class Bus:
     """
 
     def __init__(self, config: SessionConfig, clock: Clock, naming: Naming, savings: Savings = ALL) -> None:
+        self.session_name = config.name
+        """What its ids depend on; empty: nothing, they are random."""
         self.networked = networked = config.networked
         """Whether other processes may take part."""
         self.wire = LateSession(partial(open_session, config))
@@ -225,15 +230,16 @@ class Bus:
             receiver = arrival.receiver
             if self.link is not None and isinstance(receiver, Subscription):
                 heard = Carried(receiver.name, "", arrival.source.sequence, receiver.is_latched, True)
-                self.link.carry(heard, partial(self._enter, arrival))
+                self.link.carry(heard, partial(self.enter, arrival))
             elif self.link is not None and isinstance(receiver, Service):
                 asked = Carried(receiver.name, "", arrival.source.sequence, False, True)
-                self.link.carry_call(asked, partial(self._enter, arrival))
+                self.link.carry_call(asked, partial(self.enter, arrival))
             else:
-                self._enter(arrival)
+                self.enter(arrival)
         return len(arrivals)
 
-    def _enter(self, arrival: Arrival) -> None:
+    def enter(self, arrival: Arrival) -> None:
+        """Put what came from outside into its inbox."""
         for tap in self.arrival_taps:
             tap(arrival)
         arrival.receiver.enqueue(arrival.data, True)
@@ -279,6 +285,24 @@ class Bus:
         """Call back for every sample that this process publishes, while it publishes it."""
         self.taps.append(callback)
 
+    def go_alone(self) -> None:
+        """Be, in a fork, a bus without a network: what Zenoh made is kept, and never touched again.
+
+        Its threads are not there, one of its locks may be held for ever, and who ends what it made talks to
+        others with the voice of the process that was forked. Messages and requests on their way between own
+        nodes arrive; what others have said and nobody has admitted was never said.
+        """
+        self.external.forked()
+        self.arrival_taps.clear()
+        if not (self.networked or self.wire.is_open):
+            return
+        ZenohQuestion.is_reachable = False
+        _left.append((self.wire, self._starting, getattr(self, "_bridge", None)))
+        self.networked, self._starting = False, None
+        self.wire = LateSession(_no_session)
+        self.in_process.is_private = True
+        _left.extend(node.go_alone() for node in self.nodes)
+
     def close(self) -> None:
         """Destroy the nodes and leave the network. Harmless when repeated."""
         if self._closed:
@@ -320,3 +344,7 @@ class Bus:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _no_session() -> zenoh.Session:
+    raise BridgeError("a fork of a run has no network")

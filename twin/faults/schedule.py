@@ -70,12 +70,24 @@ class FaultSchedule:
         Raises:
             ScenarioError: The run lacks what is to fail; all such faults, each with its line.
         """
-        self._world = context.world
-        context = replace(context, streams=streams(scenario.faults))
+        self._world, self._context = context.world, context
         self._begun: set[str] = set()
         self._watched: list[_Watched] = []
+        self.extend(scenario)
+        # Robots that pass for hardware do not know what is wrong with them.
+        tells = context.bus.clock.is_simulated and any(watched.fault.text for watched in self._watched)
+        self._logger = context.bus.create_node("faults").get_logger() if tells else None
+
+    def extend(self, scenario: Scenario) -> None:
+        """Prepare those of a scenario that come behind the ones that there are.
+
+        Raises:
+            ScenarioError: As from the constructor.
+        """
+        context = replace(self._context, streams=streams(scenario.faults))
         problems: list[Problem] = []
-        for i, (entry, name) in enumerate(zip(scenario.faults, titles(scenario.faults), strict=True)):
+        named = list(enumerate(zip(scenario.faults, titles(scenario.faults), strict=True)))
+        for i, (entry, name) in named[len(self._watched) :]:
             try:
                 self._watched.append(self._prepared(entry, name, context))
             except Faults as wrong:
@@ -85,9 +97,6 @@ class FaultSchedule:
                 ]
         if problems:
             raise ScenarioError(problems)
-        # Robots that pass for hardware do not know what is wrong with them.
-        tells = context.bus.clock.is_simulated and any(watched.fault.text for watched in self._watched)
-        self._logger = context.bus.create_node("faults").get_logger() if tells else None
         self.robots = frozenset[str]().union(*(watched.fault.robots for watched in self._watched))
         """Robots that run in the process of the physics."""
 

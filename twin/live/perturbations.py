@@ -11,12 +11,13 @@ from twin.scenario.schema import Scenario, of_document
 from twin.strict_yaml import Document, apply_override, checked
 
 
-def perturbed(scenario: Scenario, text: str) -> tuple[Scenario, ClockError]:
+def perturbed(scenario: Scenario, text: str, option: str = "--perturb") -> tuple[Scenario, ClockError]:
     """Return a scenario with more faults, there from the start, and how wrong the robot's clock is.
 
     Args:
         scenario: Whose own faults stay.
         text: `KEY=VALUE,KEY=VALUE`: faults of which one number tells enough, and the fields of `ClockError`.
+        option: Of the command line, for sentences.
 
     Raises:
         ScenarioError: With everything in `text` that is wrong.
@@ -29,7 +30,7 @@ def perturbed(scenario: Scenario, text: str) -> tuple[Scenario, ClockError]:
     for word in filter(None, map(str.strip, text.split(","))):
         key, equals, value = word.partition("=")
         if not equals:
-            problems.append(Problem(f"--perturb {word}: must be KEY=VALUE, such as wheel_radius=0.97"))
+            problems.append(Problem(f"{option} {word}: must be KEY=VALUE, such as wheel_radius=0.97"))
         elif key in ClockError.model_fields:
             _put(clock, (key,), value, word)
         elif key in kinds:
@@ -37,7 +38,7 @@ def perturbed(scenario: Scenario, text: str) -> tuple[Scenario, ClockError]:
             _put(document, ("faults", len(faults) - 1, key), value, word)
         else:
             known = nearest(key, [*kinds, *ClockError.model_fields])
-            problems.append(Problem(f"--perturb {word}: there is no '{key}'; {known}"))
+            problems.append(Problem(f"{option} {word}: there is no '{key}'; {known}"))
     error, changed = RIGHT, scenario
     try:
         error = checked(clock, ClockError, error=ScenarioError)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge.bus import Bus
@@ -140,7 +141,7 @@ def build(
         savings=savings,
     )
     clock = clock or Clock()
-    name = outside.session if network.networked else "twin"
+    name = network.name or (outside.session or token_hex(8) if network.networked else "twin")
     bus = Bus.of(replace(network, name=name), clock, savings=savings)
     bus.use_sim_time = clock.is_simulated
     bus.starting()

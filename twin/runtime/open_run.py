@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from twin.bridge.cdr.codec import codec
 from twin.bridge.topics import Sample
 from twin.bridge.wire.interrupts import guard
 from twin.bridge.wire.session import SessionConfig
@@ -43,6 +45,8 @@ _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
 _LIVE_S = 0.2
 """A viewer is as much behind the run, at most."""
+_left: list[object] = []
+"""What belongs to the process of which this one is a fork."""
 _SHOWN_S = 0.25
 """Between two calls of a progress bar, by the clock on the wall."""
 
@@ -125,6 +129,8 @@ class OpenRun:
         self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
+        self.between_ticks: list[Callable[[], None]] = []
+        """Called after each tick of `advance`."""
         self._thought = False
         """Whether a tick is under way, at an agent's place."""
         bag_tap = None
@@ -134,6 +140,7 @@ class OpenRun:
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
         taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
         taps += [] if bag_tap is None else [bag_tap.on_sample]
+        self._observers = taps
         network = network or SessionConfig(listen=outside.endpoints(listen))
         # Who keeps time cannot wait for kernels; workers share those that are there when they begin.
         needed = pace is not None or network.networked or workers > 0
@@ -166,7 +173,10 @@ class OpenRun:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
                 self._sink.declare(parts.world, wheels)
-            self._pace = Pace(pace) if isinstance(pace, int | float) else pace
+            self._pace = kept = Pace(pace) if isinstance(pace, int | float) else pace
+            if kept is not None:
+                world = parts.world
+                self.run.wait = lambda: kept.keep(world.time_ns * 1e-9)
             self._ending = ending.pop_all()
             if out is not None:
                 self._ending.callback(lambda: self.kept().write(out))
@@ -201,10 +211,10 @@ class OpenRun:
                 run.tick()
                 if run.world.time_ns >= self.digest.second_ends_ns:
                     self.digest.end_second(run.world.state_digest())
+                for each in self.between_ticks:
+                    each()
                 if until is not None and until():
                     return True
-                if self._pace is not None:
-                    self._pace.keep(run.world.time_ns * 1e-9)
                 if progress is not None and time.perf_counter() - shown > _SHOWN_S:
                     shown = time.perf_counter()
                     simulated = run.world.time_ns * 1e-9
@@ -236,8 +246,6 @@ class OpenRun:
                 if self._thought:
                     run.act()
                     self._thought = False
-                    if self._pace is not None:
-                        self._pace.keep(run.world.time_ns * 1e-9)
                 if run.over:
                     return False
                 run.think()
@@ -268,6 +276,31 @@ class OpenRun:
         finally:
             gc.unfreeze()
 
+    def show(self, topic: str, message: Any) -> None:
+        """Draw a message that no node has published, if there is a recording."""
+        if self._sink is not None:
+            name, now_ns = codec(type(message)).msgtype, self.run.world.time_ns
+            sample: Any = SimpleNamespace(topic=topic, msgtype=name, time_ns=now_ns, message=message)
+            self._sink.on_sample(sample)
+
+    def on_close(self, callback: Callable[[], None]) -> None:
+        """Call back when the run is closed, while all of it is there."""
+        self._ending.callback(callback)
+
+    def go_alone(self) -> None:
+        """Go on in a fork of the process, between two ticks: heard by nobody, and as fast as possible.
+
+        Its digest goes on, too. What the run leaves, and what observes it, stays with the other process; it
+        is kept here, so that nothing is ended twice.
+        """
+        self.run.go_alone()
+        bus = self.run.bus
+        bus.taps[:] = [tap for tap in bus.taps if tap not in self._observers]
+        _left.append((self._ending.pop_all(), self._sink, self._observers))
+        self._sink = self._pace = self._out = None
+        self.run.wait = lambda: None
+        self.between_ticks = []
+
     def finish(self) -> Verdict:
         """Judge the run as it stands, write what it leaves, and close it.
 
@@ -289,20 +322,24 @@ class OpenRun:
 
     def kept(self) -> KeptRun:
         """Return what other runs are compared with, and of what this one is made again; at its end."""
-        source = self.run.scenario.source
         return KeptRun(
-            provenance=Provenance(
-                file=str(source.file),
-                scenario=source.data,
-                nodes=self._outside.nodes,
-                clock=self._outside.clock(self.run.bus.networked),
-                files=source.files(),
-                plugins=self._executed.versions,
-                versions=versions(),
-                cpu=cpu_class(),
-            ),
+            provenance=self.provenance(),
             digest=self._finished,
             hashes=self.digest.hashes(self.run.world.state_digest()),
+        )
+
+    def provenance(self) -> Provenance:
+        """Return with what the run is made."""
+        source = self.run.scenario.source
+        return Provenance(
+            file=str(source.file),
+            scenario=source.data,
+            nodes=self._outside.nodes,
+            clock=self._outside.clock(self.run.bus.networked),
+            files=source.files(),
+            plugins=self._executed.versions,
+            versions=versions(),
+            cpu=cpu_class(),
         )
 
     def _verdict(self) -> Verdict:

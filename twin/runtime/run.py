@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge.msgs import Clock as ClockMsg
@@ -75,6 +76,8 @@ class Run:
         self._end_ns = round(scenario.duration * 1e9)
         """When the run ends, at the latest."""
         self._mission_end_ns: int | None = None
+        self.wait: Callable[[], None] = lambda: None
+        """Returns when the world's time has come, if the run keeps to a pace."""
         self._check()  # where everything starts
 
     @property
@@ -92,6 +95,23 @@ class Run:
 
         self.workers = Workers(self, count)
         return self.workers
+
+    def add_faults(self, scenario: Scenario) -> None:
+        """Take a scenario that is this one with more faults, behind those it has; they are due by its keys.
+
+        Raises:
+            ScenarioError: The run lacks what is to fail.
+        """
+        self.scenario = scenario
+        if self.faults is None:
+            self.faults = self._schedule_faults()
+        else:
+            self.faults.extend(scenario)
+
+    def go_alone(self) -> None:
+        """Go on in a fork, heard by nobody: no network, no recording."""
+        self._sink, self.world.crash_folder = None, None
+        self.bus.go_alone()
 
     def _schedule_faults(self) -> FaultSchedule:
         """Prepare the faults, and let those happen that are there from the start."""
@@ -165,7 +185,8 @@ class Run:
         world.step(end - world.step_count)
 
     def sense(self) -> None:
-        """5. Sensors due publish, stamped with the new time."""
+        """5. Sensors due publish, stamped with the new time, when that has come."""
+        self.wait()
         self.parts.clock.now_ns = self.world.time_ns
         self.schedule.fire(self.world.step_count)
 

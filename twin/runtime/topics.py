@@ -49,8 +49,7 @@ def watch_topics(bus: Bus, checks: Sequence[Check]) -> None:
             for sample in endpoint.retained(1):
                 on_sample(sample)
     bus.tap(on_sample)
-    if bus.networked:
-        bus.arrival_taps.append(on_arrival)
+    bus.arrival_taps.append(on_arrival)
 
 
 def _key(endpoint: Publisher[Any] | Subscription[Any]) -> tuple[str, str]:

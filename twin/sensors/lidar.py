@@ -126,6 +126,13 @@ class Lidar(Sensor):
         np.putmask(ranges, distance < spec.range_min, -np.inf)
         return LidarReading(time_ns=time_ns, ranges=ranges)
 
+    def look(self) -> tuple[Array, Array, Array]:
+        """Return what is there, without noise or limits: distances, shape (samples,) [m], inf for nothing.
+
+        With it the directions of the rays and the normals of what they meet in the world, shape (samples, 3).
+        """
+        return self._rays.cast(), self._rays.directions, self._rays.normals
+
     @classmethod
     def to_message(cls, spec: LidarSpec, header: Header, reading: LidarReading) -> LaserScan:
         """Return a scan, read-only, with every number as precise as it will be on the wire."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,6 +18,9 @@ class NoiseStream:
     The numbers of a tick do not depend on how often, or whether, other ticks were drawn, nor on other
     streams: adding a sensor changes no other sensor's noise.
     """
+
+    branch: ClassVar[int] = 0
+    """Which of several futures this process is, if it was forked for one: each has numbers of its own."""
 
     def __init__(self, seed: int, name: str) -> None:
         """Derive the key; `seed` is any integer, `name` unique in a run."""
@@ -42,5 +45,5 @@ class NoiseStream:
 
     def _seek(self, tick: int, kind: int) -> None:
         # The lowest word counts blocks within a tick. A prepared state is 8x cheaper than a new generator.
-        self._words["counter"] = (0, tick, kind, 0)
+        self._words["counter"] = (0, tick, kind, NoiseStream.branch)
         self._bits.state = self._start

@@ -17,9 +17,10 @@ from twin.bridge.node.timers import Rate, Timer
 from twin.bridge.parameters.node_parameters import NodeParameters
 from twin.bridge.qos import PARAMETER_EVENTS, QoS, as_qos
 from twin.bridge.services import Client, Respond, Service
-from twin.bridge.topics import Publisher, Subscription
+from twin.bridge.topics import Endpoint, Publisher, Subscription
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.keys import NodeToken
+from twin.bridge.wire.late_session import Gone
 from twin.errors import BridgeError
 from twin.periods import Period, period_of
 
@@ -278,6 +279,14 @@ class Node(NodeParameters, NodeGraph):
     def wake(self) -> None:
         """Spin the next time: what is due has changed."""
         self.due_ns = 0
+
+    def go_alone(self) -> list[Any]:
+        """Be without a network, in a fork; return what Zenoh made, see `Endpoint.go_alone`."""
+        left: list[Any] = [self._liveliness]
+        self._liveliness = Gone()
+        for endpoint in self._endpoints:
+            left += endpoint.go_alone() if isinstance(endpoint, Endpoint) else [endpoint]
+        return left
 
     def destroy(self) -> None:
         """Leave the bus; executions end as if cancelled. Harmless when repeated."""

@@ -19,6 +19,8 @@ class NodeOptions:
     """Whether every value given at the start becomes a parameter."""
     start_parameter_services: bool = True
     """Whether others may see and change the parameters, and hear of changes before the first one."""
+    start_parameter_event_publisher: bool = True
+    """Whether changes of parameters are told on /parameter_events."""
     enable_rosout: bool = True
     """Whether the node is on /rosout before its first message, where there is a network."""
     start_type_description_service: bool = True

@@ -73,7 +73,8 @@ def offer(node: Node) -> None:
     if node.options.enable_rosout:
         node.get_logger().advertise()
     if node.options.start_parameter_services:
-        node.advertise_parameter_events()
+        if node.options.start_parameter_event_publisher:
+            node.advertise_parameter_events()
         offered |= _of_parameters(node)
     if node.options.enable_logger_service:
         offered |= node.get_logger().levels.offered

@@ -119,7 +119,8 @@ class NodeParameters(Parameters):
         ):
             descriptor = new(ParameterDescriptor, description=description, read_only=True)
             self.declare_parameter(name, value, descriptor, ignore_override=fixed)
-        self._tell = tell  # not of these two: 25 nodes would say the same
+        if options.start_parameter_event_publisher:
+            self._tell = tell  # not of these two: 25 nodes would say the same
         if options.automatically_declare_parameters_from_overrides:
             for name, value in given.items():
                 if not self.has_parameter(name):

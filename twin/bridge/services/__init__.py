@@ -19,11 +19,13 @@ from twin.bridge.types import ServiceType
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, pack_attachment, parse_attachment
+from twin.bridge.wire.late_session import Gone
 from twin.bridge.wire.ros2dds import pack_request_id
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
 
 if TYPE_CHECKING:
+    from twin.bridge.bus import Bus
     from twin.bridge.node import Node
 
 __all__ = ["Client", "Future", "Respond", "Service"]
@@ -62,6 +64,19 @@ class Service(Endpoint):
     def enqueue(self, data: Question, external: bool) -> None:
         """Put a request into the node's inbox."""
         self.node.inbox.append([self, data, external])
+
+    def go_alone(self) -> list[Any]:
+        """Answer clients of this process only; see `Endpoint.go_alone`."""
+        left = super().go_alone()
+        bus = self.node.bus
+        clients = {e.gid: e for node in bus.nodes for e in node.endpoints if isinstance(e, Client)}
+        asked = [entry[1] for entry in self.node.inbox if entry[0] is self]
+        for question in (*asked, *self._open):
+            if isinstance(question, ZenohQuestion):
+                client = clients.get(question.source.gid)
+                question.go_alone(partial(_tell, bus, client, question.source.sequence))
+                left.append(question.query)
+        return left
 
     def destroy(self) -> None:
         """Leave the graph; who still waits for a response learns that there will be none."""
@@ -124,7 +139,8 @@ class Client(Endpoint):
         super().__init__(node, "SC", name, srv_type.name, _QOS)
         self._requests, self._responses = codecs(srv_type)
         self._sequence = 0
-        self._pending: dict[Future, None] = {}
+        self._pending: dict[Future, int] = {}
+        """Sequence numbers of requests that have no answer yet."""
         self.timed: Callable[[int, int, int], None] | None = None
         """Called, in any thread, with when a request left by `time.perf_counter_ns`, when it was answered by
         the server's clock, and when the answer was here [ns]; not for servers of this process."""
@@ -168,6 +184,15 @@ class Client(Endpoint):
         """Forget a request: its future stays undone, and a response that comes later is ignored."""
         self._pending.pop(future, None)
 
+    def pending(self, sequence: int) -> Future | None:
+        """Return what waits for the answer to a request, if anything does."""
+        return next((future for future, asked in self._pending.items() if asked == sequence), None)
+
+    def go_alone(self) -> list[Any]:
+        """Ask services of this process only; see `Endpoint.go_alone`."""
+        left, self._querier, self._short = [*super().go_alone(), self._querier], Gone(), True
+        return left
+
     def destroy(self) -> None:
         """Leave the graph; futures that are not done end with an error."""
         super().destroy()
@@ -188,7 +213,7 @@ class Client(Endpoint):
             raise TypeError(f"{self.name} takes {self._requests.msgtype}, not {type(request).__name__}")
         self._sequence += 1
         bus, future = self.node.bus, Future(self.name)
-        self._pending[future] = None
+        self._pending[future] = self._sequence
         source = Attachment(self._sequence, bus.clock.now_ns, self.gid)
 
         def deliver(data: Any) -> None:
@@ -246,3 +271,9 @@ class Client(Endpoint):
             future.finish(None, f"the service {self.name} answered with something else than a response")
             return
         future.finish(response)
+
+
+def _tell(bus: Bus, client: Client | None, sequence: int, payload: bytes | None) -> None:
+    """Give an answer to the client of this process that has asked, if it was one of this process."""
+    if client is not None and (future := client.pending(sequence)) is not None:
+        bus.deliver(client, (future, payload))

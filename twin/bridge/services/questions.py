@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import zenoh
 
@@ -29,9 +29,14 @@ class Question(Protocol):
 class ZenohQuestion:
     """A request that came through Zenoh, from anywhere."""
 
+    is_reachable: ClassVar[bool] = True
+    """Whether answers reach anybody; in a fork they do not, be it that a link still carries one."""
+
     def __init__(self, query: zenoh.Query, source: Attachment) -> None:
         self.query = query
-        self._source = source
+        self.source = source
+        """Of the request."""
+        self._answer: Callable[[bytes | None], None] | None = None
 
     @property
     def payload(self) -> bytes:
@@ -40,7 +45,11 @@ class ZenohQuestion:
 
     def reply(self, payload: bytes, now_ns: int) -> None:
         """Answer at a time [ns] with a response as CDR."""
-        query, source = self.query, self._source
+        if self._answer is not None:
+            self._answer(payload)
+        if self._answer is not None or not self.is_reachable:
+            return
+        query, source = self.query, self.source
         typed = parse_key(str(query.key_expr)) is not None  # ros2dds: the query itself is the address
         attachment = pack_attachment(source.sequence, now_ns, source.gid) if typed else None
         with query:
@@ -48,7 +57,15 @@ class ZenohQuestion:
 
     def drop(self) -> None:
         """Answer never."""
+        if self._answer is not None:
+            self._answer(None)
+        if self._answer is not None or not self.is_reachable:
+            return
         self.query.drop()  # type: ignore[no-untyped-call]
+
+    def go_alone(self, answer: Callable[[bytes | None], None]) -> None:
+        """Give the answer, or None for none, to a function from now on: there is no network."""
+        self._answer = answer
 
 
 class InProcessQuestion:

@@ -21,7 +21,7 @@ from twin.bridge.topics.sample import Sample as Sample
 from twin.bridge.wire.admission import Admission, attachment_of, read
 from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment, EndpointKind, gid, pack_attachment, parse_attachment
-from twin.bridge.wire.late_session import LateSession
+from twin.bridge.wire.late_session import Gone, LateSession
 from twin.bridge.wire.naming import Interface
 from twin.bridge.wire.session import direct
 from twin.errors import BridgeError
@@ -80,6 +80,11 @@ class Endpoint:
             self._declared.append(self.node.bus.wire.declare_token(self._token))
         if self.node.bus.announced is not None:
             self.node.bus.announced(self)
+
+    def go_alone(self) -> list[Any]:
+        """Be without a network from now on, in a fork; return what Zenoh made, which has to be kept."""
+        left, self._declared = self._declared, [Gone()] if self._declared else []
+        return left
 
     def destroy(self) -> None:
         """Leave the graph; nothing arrives any more. Harmless when repeated."""
@@ -162,15 +167,15 @@ class Publisher(Endpoint, Generic[M]):
         receivers = None
         if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
             receivers = listeners.receivers
-        latched = self._latched and receivers is not None
+        latched = self._latched and (receivers is not None or listeners is None)  # Zenoh's: for a fork
         # What stays as it is, and nobody is given, need not be settled.
         if receivers or latched or (bus.taps and not frozen):
             sample.settle(frozen)
         for tap in bus.taps:
             tap(sample)
+        if latched:
+            self._retained.append(sample)
         if receivers is not None:
-            if latched:
-                self._retained.append(sample)
             for receiver in receivers:
                 bus.deliver(receiver, sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
@@ -203,6 +208,15 @@ class Publisher(Endpoint, Generic[M]):
         for sample in self._retained:
             self._put(sample)
         self._retained.clear()
+
+    def go_alone(self) -> list[Any]:
+        """Be heard in this process only; see `Endpoint.go_alone`."""
+        left, self._zenoh = [*super().go_alone(), self._zenoh], Gone()
+        if self._listeners is None:
+            self._listeners = self._bus.in_process.listeners(self.key)
+            if self._latched and self._declared:
+                self._listeners.latched.append(self)
+        return left
 
     def destroy(self) -> None:
         """Leave the graph; who comes later hears nothing."""
@@ -313,6 +327,15 @@ class Subscription(Endpoint, Generic[M]):
             message, self._origin = received, origin
         self._callback(message)
         self._origin = None
+
+    def go_alone(self) -> list[Any]:
+        """Hear this process only; see `Endpoint.go_alone`."""
+        left = super().go_alone()
+        for entry in self._pending:
+            if isinstance(entry[1], tuple) and isinstance(origin := entry[1][1], zenoh.Sample):
+                entry[1] = (entry[1][0], parse_attachment(attachment_of(origin)))
+                left.append(origin)
+        return left
 
     def destroy(self) -> None:
         """Leave the graph; waiting messages are not delivered."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from twin.bridge.qos import QoS
 from twin.bridge.topics import Endpoint, declare_publisher
 from twin.bridge.wire.keys import EndpointKind, pack_attachment
+from twin.bridge.wire.late_session import Gone
 
 if TYPE_CHECKING:
     from twin.bridge.node import Node
@@ -46,6 +47,11 @@ class RawPublisher(Presence):
     def has_subscribers(self) -> bool:
         """Whether somebody listens now; always true if latched: Zenoh does not tell."""
         return self.qos.durability == "transient_local" or bool(self._zenoh.matching_status.matching)
+
+    def go_alone(self) -> list[Any]:
+        """Tell nobody, in a fork; see `Endpoint.go_alone`."""
+        left, self._zenoh = [*super().go_alone(), self._zenoh], Gone()
+        return left
 
     def publish(self, payload: bytes) -> None:
         """Publish CDR at the clock's time."""

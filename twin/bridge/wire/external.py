@@ -79,6 +79,12 @@ class ExternalQueue:
                 self._drop_oldest(own)
         self._arrived.set()
 
+    def forked(self) -> None:
+        """Be empty, in a fork: a thread that is not there may have been about to put something in."""
+        self._lock, self._arrived = threading.Lock(), threading.Event()
+        self._waiting, self._to_report = {}, []
+        self._count = self._bytes = 0
+
     def refuse(self, reason: str, name: str, detail: str) -> None:
         """Count something that cannot be delivered; the first of its kind is logged. Called in any thread."""
         with self._lock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import zenoh
@@ -76,6 +77,18 @@ class LateSession:
     def forget(self, late: _Late) -> None:
         """Declare something no more."""
         self._waiting.pop(late, None)
+
+
+class Gone:
+    """What stands for an entity of a session in a fork, which has none; nobody is there."""
+
+    matching_status = SimpleNamespace(matching=False)
+
+    def undeclare(self) -> None:
+        """Do nothing."""
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Tell nobody."""
 
 
 class _Late:

@@ -48,6 +48,7 @@ def run_once(options: RunOptions) -> int:
         wait_for=options.wait_for or (),
         wait_timeout=options.wait_timeout,
         free=options.free,
+        keep_inputs=options.keep_inputs,
         on_execute=lambda file: stderr().print(f"executes {file}"),
     )
     fault = None

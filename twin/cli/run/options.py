@@ -69,6 +69,9 @@ class RunOptions:
     free: Annotated[
         bool, _others("--free", help="Let others take part at their own pace; not deterministic.")
     ] = False
+    keep_inputs: Annotated[
+        bool, _others("--keep-inputs", help="Keep what they say, for snapshots of `twin fork --save`.")
+    ] = False
     connect: Annotated[
         list[str] | None,
         _others(metavar="ENDPOINT", help="Join the graph of a router, e.g. tcp/127.0.0.1:7447."),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import partial
 
 from twin.bridge.action_types import NavigateThroughPoses, NavigateToPose
-from twin.bridge.actions import ActionClient
+from twin.bridge.actions import ActionClient, GoalHandle
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import PoseStamped, new
 from twin.geometry import Pose2
@@ -83,6 +83,16 @@ class BtNavigatorNode:
     def goal(self) -> Pose2 | None:
         """The last goal that was taken, of several poses the last one, in the map frame; None before that."""
         return self._context.goal
+
+    @property
+    def under_way(self) -> tuple[GoalHandle, ...]:
+        """The goals that were accepted and have not ended, in the order of acceptance."""
+        return tuple(goal for navigator in self._navigators for goal in navigator.under_way)
+
+    @property
+    def frame(self) -> str:
+        """The frame of its map."""
+        return self._context.robot_pose.frames.map
 
     @property
     def recovering(self) -> bool:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SCAN_COLOUR = (255, 70, 70, 255)
 PLAN_COLOUR = (70, 140, 255, 255)
+FUTURE_COLOUR = (255, 190, 70, 255)
 PARTICLE_COLOUR = (235, 60, 170, 255)
 LAYER_HEIGHTS = {"map": -0.02, "global_costmap/costmap": -0.015, "local_costmap/costmap": -0.01}
 """Where rasters lie [m]: below the floor's z = 0 and one above the other, so that they do not flicker."""
@@ -250,7 +251,8 @@ class PathChannel(_SpatialChannel[Floats]):
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         super().__init__(context, namespace, topic)
         self._last: Floats | None = None
-        self.declare(rr.LineStrips3D.from_fields(colors=[PLAN_COLOUR], radii=rr.Radius.ui_points(1.5)))
+        colour = FUTURE_COLOUR if topic.startswith("/futures/") else PLAN_COLOUR
+        self.declare(rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5)))
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep the positions."""

@@ -100,9 +100,14 @@ class Navigator:
         )
 
     @property
+    def under_way(self) -> tuple[GoalHandle, ...]:
+        """The goals that were accepted and have not ended, be it that one waits for the robot's pose."""
+        return self._server.goals
+
+    @property
     def is_active(self) -> bool:
-        """Whether a goal was accepted and has not ended, be it that it still waits for the robot's pose."""
-        return bool(self._server.goals)
+        """Whether there is one."""
+        return bool(self.under_way)
 
     def failure(self) -> tuple[int, str]:
         """Return the lowest error code on the blackboard with its message; (0, '') if there is none."""
