@@ -72,6 +72,7 @@ class Followed:
             mirror.advance(note)
             self.events = robot.events
             self.judgement = mirror.statuses()[0].judgement
+            self.report = robot.divergence.monitor.report()
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +113,16 @@ def test_a_bag_gives_the_same_divergence_twice(
     assert len(followed.differences) > 350
     assert again.differences == followed.differences
     assert again.poses == followed.poses
+    assert again.report == followed.report
+
+
+def test_each_series_is_summed_up_and_a_delay_and_some_loss_are_no_alarm(followed: Followed) -> None:
+    report = followed.report
+    assert report.alarms == ()
+    assert {"position", "yaw", "prediction", "scan", "delay"} <= report.series.keys()
+    assert report.series["position"].count >= len(followed.differences)
+    assert report.series["scan"].p95 < 0.02
+    assert json.loads(json.dumps(report.to_dict()))["alarm_count"] == 0
 
 
 def test_what_is_no_live_robot_is_no_twin(followed: Followed) -> None:

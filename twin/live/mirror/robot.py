@@ -9,13 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from twin.bridge.msgs import Float64, JointState, Odometry, PoseStamped, TFMessage, Twist, ns
+from twin.bridge.msgs import JointState, Odometry, PoseStamped, TFMessage, Twist, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.topics import Publisher
 from twin.geometry import Pose2
 from twin.live.guard.client import GuardClient
 from twin.live.guard.gate import Velocity
 from twin.live.guard.verdict import Verdict
+from twin.live.mirror.divergence import DivergenceNode
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
 from twin.live.mirror.holding import Holding
 from twin.live.mirror.label import Evidence, LabelConfig, judge
@@ -48,7 +49,7 @@ class Event:
     stamp_ns: int
     """By the robot's clock."""
     what: str
-    """A name: `reset`, `clock`, `values`, `order`."""
+    """A name: `reset`, `clock`, `values`, `order`, `alarm`."""
     text: str
 
 
@@ -116,15 +117,13 @@ class MirroredRobot:
             node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
         self.told = Told(node, space)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
-        self._series = {
-            name: node.create_publisher(Float64, f"divergence/{name}", 10)
-            for name in ("position", "yaw", "prediction")
-        }
+        self.divergence = DivergenceNode(node, stack, self.tell)
         node.create_task(self._run())
 
     def status(self, now_ns: int, source: Source) -> Status:
         """Return how it is mirrored at a time of the robot's clock [ns]."""
         difference, heard_ns = self.difference, self.heard_ns
+        self.divergence.monitor.clock_bound_s = source.clock_bound_s or 0.0
         acknowledged, commands = self._obeyed() if source.is_live else (False, "a bag obeys no commands")
         guarded = self.guard.status if self.guard is not None and self.guard.is_present else None
         evidence = Evidence(
@@ -145,12 +144,14 @@ class MirroredRobot:
             clock_offset_s=source.clock_offset_s,
             delay_s=self.told.delay_s,
             resets=self.follower.resets,
+            alarms=self.divergence.words,
             told=dict(self.told.words),
         )
 
     def forget(self) -> None:
         """Begin anew, where the virtual robot is: the robot's clock was set."""
         self.follower.forget()
+        self.divergence.monitor.forget()
         self._pending.clear()
         self._latest_ns = -1
         self._stepped_ns = None
@@ -164,6 +165,7 @@ class MirroredRobot:
         now_ns, world, base = self.node.now_ns, self._world, self.stack.handle.base
         virtual = world.pose(base).to_pose2()
         self.follower.note(now_ns, virtual)
+        self.divergence.place(now_ns, virtual, self.follower.correction.inverse() @ virtual)
         while self._pending and self._pending[0][0] <= now_ns:
             self._measure(*self._pending.popleft())
         elapsed_s = 0.0 if self._stepped_ns is None else (now_ns - self._stepped_ns) * 1e-9
@@ -222,9 +224,7 @@ class MirroredRobot:
         if difference is None:
             return
         self.difference, self._physical = difference, physical
-        self._series["position"].publish(Float64(data=difference.position))
-        self._series["yaw"].publish(Float64(data=difference.yaw))
-        self._series["prediction"].publish(Float64(data=difference.prediction))
+        self.divergence.difference(difference)
 
     def _on_tf(self, message: TFMessage) -> None:
         frames = self.stack.frames
