@@ -83,4 +83,4 @@ def test_a_robot_that_starts_again_is_followed_again_and_that_is_told(endpoint: 
         assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
         clocks = [event for event in watched.robot.events if event.what == "clock"]
         assert len(clocks) == 1
-        assert "set by +36" in clocks[0].text
+        assert "set by +3" in clocks[0].text
