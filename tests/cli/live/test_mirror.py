@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from tests.cli.conftest import Invoke
@@ -16,10 +17,17 @@ def test_a_bag_is_followed_recorded_and_asked_for_the_past(invoke: Invoke, tmp_p
     with Plant(load("diff_bot_figure8"), network=network, autonomy=True, pace=None, bag=bag) as robots:
         world = robots.run.run.world
         robots.advance(lambda: world.time_ns >= 3e9)
-    code, output, error = invoke("mirror", "diff_bot_figure8", "--bag", bag, "--record", own)
+    code, output, error = invoke(
+        "mirror", "diff_bot_figure8", "--bag", bag, "--record", own, "--out", tmp_path
+    )
     assert code == 0
     assert [line.partition(": ")[2] for line in error.splitlines()] == ["model", "shadow"]
     assert output.startswith("diff_bot  SHADOW\n")
+    verdict = json.loads((tmp_path / "verdict.json").read_text())
+    assert (verdict["verdict"], verdict["label"]) == ("pass", "shadow")
+    assert verdict["metrics"]["shadow_s"] > 2.0
+    assert verdict["metrics"]["diff_bot_position_max"] < 0.05
+    assert (tmp_path / "diff_bot_figure8.rrd").exists()
     code, output, _ = invoke("mirror", "--status", "--bag", own, "--at", 2)
     assert code == 0
     assert output.startswith("diff_bot  SHADOW\n")

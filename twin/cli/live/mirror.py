@@ -99,8 +99,15 @@ def mirror(
             return bool(received) or (end_ns is not None and run.world.time_ns >= end_ns)
 
         robots.advance(ends)
-        last = status_text(robots.statuses())
+        last, verdict = status_text(robots.statuses()), robots.verdict()
     typer.echo(last)
+    if out is not None:
+        from twin.cli.console import stdout
+        from twin.cli.run.verdict_table import verdict_report
+
+        verdict.write(out)
+        console = stdout()
+        console.print(verdict_report(verdict.to_dict(), out, short=console.is_terminal))
 
 
 def _source(bag: Path | None, connect: list[str] | None, domain: int) -> Source:

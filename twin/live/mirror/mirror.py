@@ -15,9 +15,11 @@ from twin.live.mirror.robot import COMMANDED, MirroredRobot
 from twin.live.mirror.shown import Shown
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status, to_array, worst
+from twin.live.mirror.verdict import mirror_verdict
 from twin.runtime.open_run import OpenRun
 from twin.runtime.stacks.context import Layout
 from twin.scenario.schema import Scenario
+from twin.scenario.verdict import Verdict
 
 NAMESPACE = "/twin"
 """Before the namespaces of virtual robots."""
@@ -91,6 +93,8 @@ class Mirror:
             self._label = node.create_publisher(String, "label", LATCHED)
             self._told_ns = 0
             self._told: Label | None = None
+            self._seconds: dict[Label, float] = {}
+            self._scenario = scenario
             source.begin(self.run, self.clock)
             self._ending = ending.pop_all()
 
@@ -101,6 +105,17 @@ class Mirror:
     def statuses(self) -> list[Status]:
         """Return how each robot is mirrored now."""
         return [robot.status(self.clock.now_ns, self.source) for robot in self.robots]
+
+    def verdict(self) -> Verdict:
+        """Judge what was so far: see `mirror_verdict`."""
+        return mirror_verdict(
+            self._scenario,
+            {robot.stack.name: robot.divergence.monitor.report() for robot in self.robots},
+            {robot.stack.name: robot.follower.resets for robot in self.robots},
+            worst(self.statuses()),
+            self._seconds,
+            is_live=self.source.is_live,
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -128,6 +143,7 @@ class Mirror:
     def _tell(self, statuses: list[Status]) -> None:
         self._diagnostics.publish(to_array(statuses, self.clock.now_ns))
         label = worst(statuses)
+        self._seconds[label] = self._seconds.get(label, 0.0) + _STATUS_NS * 1e-9
         if label != self._told:
             self._told = label
             self._label.publish(String(data=label))

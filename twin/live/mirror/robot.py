@@ -29,6 +29,7 @@ from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World
 
 _PENDING = 200
+_MOST_EVENTS = 10_000
 _PRESSES_N = 10.0
 """A gripper whose drive exerts more holds something."""
 _SQUEEZE = 0.1
@@ -82,7 +83,8 @@ class MirroredRobot:
         """The latest, before it was corrected."""
         self.heard_ns: int | None = None
         """When the latest data came, by the robot's clock."""
-        self.events: list[Event] = []
+        self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)
+        """The latest."""
         self._world, self._held = world, held
         self._stepped_ns: int | None = None
         localisation = context.config.localisation
