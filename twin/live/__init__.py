@@ -1,1 +1,1 @@
-"""Robots by the clock on the wall: one that stands in for a physical one."""
+"""Robots by the clock on the wall: a stand-in for hardware, mirror, divergence, guard, calibration, futures."""
