@@ -45,6 +45,14 @@ WALL_CLOCK = {
     "twin/live/plant.py": {"time_ns"},  # a physical robot's clock starts at the time of day
     "twin/live/guard/node.py": {"monotonic_ns"},  # time-outs of a robot's commands
     "twin/live/guard/client.py": {"monotonic_ns"},  # stamps that no setting of the clock moves
+    "twin/live/futures/future.py": {"process_time"},  # what a future cost
+    "twin/live/futures/futures.py": {"monotonic"},  # the time limit of a future
+    "twin/live/futures/served.py": {"monotonic"},  # how often futures are looked at
+    "twin/live/futures/inputs.py": {"process_time"},  # what the run has cost
+    "twin/live/futures/snapshot.py": {"process_time"},  # what restoring cost
+    "twin/live/mirror/exchanges.py": {"perf_counter_ns"},  # when to ask a robot for its time
+    "twin/live/mirror/live_source.py": {"monotonic", "perf_counter_ns", "sleep", "time_ns"},  # our own clock
+    "twin/bridge/services/__init__.py": {"perf_counter_ns"},  # when a question left, and its answer came
     "twin/recording/sink.py": {"monotonic_ns"},  # how much of its end a killed run may lose
     "twin/recording/player.py": {"monotonic", "sleep"},  # waits for the viewer, another program
     "twin/bridge/live.py": {"time_ns", "monotonic"},  # processes beside a run live by the wall clock

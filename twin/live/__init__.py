@@ -1,1 +1,1 @@
-"""Robots by the clock on the wall: a stand-in for hardware, mirror, divergence, guard, calibration, futures."""
+"""Robots by the clock on the wall: stand-in for hardware, mirror, divergence, guard, calibration, futures."""

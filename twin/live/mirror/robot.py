@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -115,7 +114,7 @@ class MirroredRobot:
         self._relayed = node.create_publisher(Twist, "cmd_vel", 10)
         self.guard: GuardClient | None = None
         if guard is not None:
-            self.guard = GuardClient(node, guard=f"{space}/{guard}", monotonic_ns=time.perf_counter_ns)
+            self.guard = GuardClient(node, guard=f"{space}/{guard}")
             node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
         self.told = Told(node, space)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
