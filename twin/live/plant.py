@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from twin.bridge.wire.session import SessionConfig
 
 _FOR_EVER_S = 1e9
+_SLACK_S = 0.5
+"""It makes up for what it is behind: a physical robot loses no time when another program is busy."""
 TRUTH_COLUMNS = ("robot", "stamp_ns", "x", "y", "yaw")
 """Of the file of truths: the robot's clock, pose of its base in the world [m, rad]."""
 
@@ -57,7 +59,7 @@ class Plant:
         changes: dict[str, object] = {"checks": (), "early_stop": "never", "duration": _FOR_EVER_S}
         scenario = scenario.model_copy(update=changes)
         self._starts_now = start_ns is None
-        self._pace = None if pace is None else Pace(pace)
+        self._pace = None if pace is None else Pace(pace, slack_s=_SLACK_S)
         self.clock = DeviceClock(time.time_ns() if start_ns is None else start_ns, error)
         with ExitStack() as ending:
             self._rows: Any = None
