@@ -28,8 +28,11 @@ def test_the_virtual_tote_is_set_down_where_the_physical_one_is(tmp_path: Path) 
         before = mirror.run.run.world.pose("tote_a")
         mirror.advance()
         virtual = mirror.run.run.world.pose("tote_a")
-        told = [event.text for robot in mirror.robots for event in robot.events]
+        told = [f"{event.what}: {event.text}" for robot in mirror.robots for event in robot.events]
     assert physical.to_pose2().distance(before.to_pose2()) > 5.0
     assert physical.to_pose2().distance(virtual.to_pose2()) < 0.03
     assert abs(float(physical.xyz[2] - virtual.xyz[2])) < 0.01
-    assert told == []
+    assert [text.partition("%")[0].partition(".")[0] for text in told] == [
+        "alarm: wheel radius: wheels roll 97",
+        "alarm: track: wheels are 102",
+    ], "what is otherwise is told, and nothing else"
