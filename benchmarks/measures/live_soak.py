@@ -25,6 +25,8 @@ ROUND_S = 300.0
 KIDNAPPED_S, STOPPED_S, SLOWED_S, KILLED_S, AGAIN_S = 90.0, 150.0, 210.0, 280.0, 296.0
 """When, in a round; the robot is there some seconds after it was started."""
 TOLD_S = 15.0
+MOST = 300
+"""Letters of a line."""
 EARLY_S = 6.0
 """A robot that was there sooner is carried away sooner."""
 DEGRADED_S = 0.6
@@ -80,6 +82,7 @@ def soak(minutes: float) -> None:
     done: list[tuple[float, str]] = []
     seconds: list[tuple[float, str]] = []
     memory: list[float] = []
+    told: list[tuple[float, str]] = []
     network = SessionConfig(mode="client", connect=(robot.endpoint,), timeout_s=60.0)
     overrides = {"world.obstacles": "[]", "mission.max_failed": "100000", "mission.distance": "1000 km"}
     scenario = load(SCENARIO, overrides)
@@ -95,19 +98,19 @@ def soak(minutes: float) -> None:
                 do()
                 if what:
                     done.append((now_s, what))
+            told.extend((now_s, f"{event.what}: {event.text}") for event in mirrored.events)
+            mirrored.events.clear()
             if now_s >= len(seconds):
                 seconds.append((now_s, mirror.statuses()[0].judgement.label))
             if now_s >= 60.0 * len(memory):
                 memory.append(resident_mb())
             return now_s >= minutes * 60.0
 
-        start_ns = mirror.clock.now_ns
         mirror.advance(tick)
-        told = [((event.stamp_ns - start_ns) * 1e-9, event) for event in mirrored.events]
     robot.kill()
     for at_s, what in done:
-        words = [f"{e.what}: {e.text}" for stamp_s, e in told if at_s - EARLY_S <= stamp_s < at_s + TOLD_S]
-        print(f"{at_s:7.1f} s  {what:10} {'; '.join(dict.fromkeys(words)) or 'NOTHING TOLD'}")
+        words = [text for told_s, text in told if at_s - EARLY_S <= told_s < at_s + TOLD_S]
+        print(f"{at_s:7.1f} s  {what:10} {'; '.join(dict.fromkeys(words)) or 'NOTHING TOLD'}"[:MOST])
     wrong = [
         (at_s, label, want) for at_s, label in seconds if (want := expected(at_s, done)) and label != want
     ]
