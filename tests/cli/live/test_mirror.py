@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from tests.cli.conftest import Invoke
@@ -21,7 +22,7 @@ def test_a_bag_is_followed_recorded_and_asked_for_the_past(invoke: Invoke, tmp_p
         "mirror", "diff_bot_figure8", "--bag", bag, "--record", own, "--out", tmp_path
     )
     assert code == 0
-    assert [line.partition(": ")[2] for line in error.splitlines()] == ["model", "shadow"]
+    assert re.findall(r"^[\d.]+ s: (\w+)$", error, re.MULTILINE) == ["model", "shadow"]
     assert output.startswith("diff_bot  SHADOW\n")
     verdict = json.loads((tmp_path / "verdict.json").read_text())
     assert (verdict["verdict"], verdict["label"]) == ("pass", "shadow")

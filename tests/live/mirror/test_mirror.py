@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from twin.bridge.msgs import Odometry, TFMessage, TransformStamped, new
 from twin.bridge.wire.session import SessionConfig
 from twin.errors import RecordingError
 from twin.geometry import Pose2, wrap_angle
@@ -191,3 +192,36 @@ def test_a_recording_shows_both_robots_and_the_label_on_one_time_line(
     for entity in ("/trails/diff_bot/odometry", "/trails/diff_bot/truth", "/estimate/diff_bot"):
         assert entity in recording.entities
     assert recording.table("/mission/label")["state"].to_pylist() == ["shadow"]
+
+
+def test_numbers_that_are_none_are_told_once_and_forbid_to_speak_of_a_twin(
+    scenario: Scenario, recorded: Path
+) -> None:
+    with Mirror(scenario, BagSource(recorded / "bag")) as mirror:
+        (robot,) = mirror.robots
+        node = mirror.run.run.bus.create_node("broken")
+        transforms, odometry = (
+            node.create_publisher(TFMessage, "/tf"),
+            node.create_publisher(Odometry, "/odom"),
+        )
+        bad = new(TransformStamped, child_frame_id=robot.stack.frames.base)
+        bad.header.frame_id = robot.stack.frames.odom
+        bad.transform.translation.x = math.nan
+        worse = new(Odometry)
+        worse.pose.pose.position.x = math.nan
+        said = []
+
+        def break_it() -> bool:
+            if 2e9 < mirror.run.run.world.time_ns < 3e9:
+                transforms.publish(TFMessage(transforms=[bad]))
+                odometry.publish(worse)
+            said.extend(mirror.statuses()[0].judgement.why)
+            return mirror.run.run.world.time_ns > 4e9
+
+        mirror.advance(break_it)
+        told = [event.what for event in robot.events]
+        assert told.count("values") == 1
+        assert any("invalid data" in why for why in said)
+        assert robot.follower.resets == 0
+        assert robot.difference is not None
+        assert robot.difference.position < 0.05

@@ -57,6 +57,16 @@ def test_it_obeys_again_after_it_did_not() -> None:
     assert obedience.obeyed is True
 
 
+def test_numbers_that_are_none_acknowledge_nothing() -> None:
+    obedience = Obedience()
+    obedience.command(0, 0.0, 0.0)
+    obedience.motion(100 * MS, float("nan"), 0.0)
+    obedience.command(200 * MS, float("nan"), float("inf"))
+    assert obedience.obeyed is None
+    obedience.motion(300 * MS, 0.0, 0.0)
+    assert obedience.obeyed is True
+
+
 def test_slow_driving_is_rest_and_asks_for_nothing() -> None:
     obedience = Obedience()
     obedience.command(0, 0.01, 0.01)

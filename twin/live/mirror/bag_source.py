@@ -85,7 +85,9 @@ class BagSource(Source):
             return None
         log_ns = self._start_ns + self._run.run.world.time_ns
         set_by = self._clock.follow(log_ns + self._ahead[0][1], 0) * 1e-9
-        return ("clock", f"the robot's clock was set by {set_by:+.3f} s") if abs(set_by) > 0.5 else None
+        if set_by >= 0.0 and set_by < _LARGEST_STEP_NS * 1e-9:
+            return None
+        return "clock", f"the robot's clock was set by {set_by:+.3f} s"
 
     def close(self) -> None:
         """Close the bag."""

@@ -32,6 +32,8 @@ from twin.models.description import RobotDescription
 from twin.runtime.defaults.from_description import scan_lidar
 from twin.runtime.stacks.robot import RobotStack
 
+_DOUBTS = ("duplicate robot", "invalid data", "robot restarted", "odometry jump", "kidnapped")
+"""Alarms that forbid to speak of a twin."""
 _TALKS_NS = 1_000_000_000
 _TALKS = 5
 """Who sent so many messages in that time publishes a topic."""
@@ -88,6 +90,11 @@ class DivergenceNode:
     def words(self) -> tuple[str, ...]:
         """Alarms that last, in sentences."""
         return tuple(f"{alarm.cause}: {alarm.text}" for alarm in self._alarms.values())
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Those of them for which it is not sure where, or which, the physical robot is."""
+        return tuple(f"{cause}: {self._alarms[cause].text}" for cause in _DOUBTS if cause in self._alarms)
 
     def _build_sensors(self, description: RobotDescription, real: str, space: str) -> None:
         lidar = scan_lidar(description)

@@ -15,6 +15,7 @@ LABELS: tuple[Label, ...] = ("model", "shadow", "twin")
 
 
 NOBODY = "nothing commands the robot from here"
+"""Where the robot's own autonomy, or somebody else, does."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class Evidence:
     commands: str = NOBODY
     """Why `acknowledged` is false, if it is."""
     doubts: tuple[str, ...] = ()
-    """What else forbids the word `twin`: two robots with one name, data that cannot be."""
+    """What else forbids the word `twin`: two robots with one name, numbers that are none, a rival."""
 
 
 @dataclass(frozen=True, kw_only=True)

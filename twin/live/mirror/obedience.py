@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from twin.live.mirror.label import NOBODY
@@ -36,7 +37,9 @@ class Obedience:
         """When what is commanded began to differ from rest, or to be rest."""
 
     def command(self, time_ns: int, linear: float, angular: float) -> None:
-        """Take a command [m/s, rad/s]."""
+        """Take a command [m/s, rad/s]; one that is not finite is none."""
+        if not math.isfinite(linear + angular):
+            return
         moves = self._moves(linear, angular)
         if self._since_ns is None or moves != self._moves(*self._told):
             self._since_ns = time_ns
@@ -44,8 +47,8 @@ class Obedience:
         self._told = linear, angular
 
     def motion(self, time_ns: int, linear: float, angular: float) -> None:
-        """Take what odometry tells [m/s, rad/s]."""
-        if self._since_ns is None:
+        """Take what odometry tells [m/s, rad/s]; what is not finite tells nothing."""
+        if self._since_ns is None or not math.isfinite(linear + angular):
             return
         config, told = self.config, self._told
         waited_s = (time_ns - self._since_ns) * 1e-9

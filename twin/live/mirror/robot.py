@@ -6,6 +6,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from twin.bridge.msgs import JointState, Odometry, PoseStamped, TFMessage, Twist, ns
@@ -29,6 +30,8 @@ from twin.sim.world import World
 
 _PENDING = 200
 _MOST_EVENTS = 10_000
+_AGAIN_NS = 10_000_000_000
+"""What comes with each message is told so often."""
 _PRESSES_N = 10.0
 """A gripper whose drive exerts more holds something."""
 _SQUEEZE = 0.1
@@ -49,7 +52,7 @@ class Event:
     stamp_ns: int
     """By the robot's clock."""
     what: str
-    """A name: `reset`, `clock`, `values`, `order`, `alarm`."""
+    """A name: `reset`, `clock`, `pace`, `values`, `grip`, `model`, `alarm`."""
     text: str
 
 
@@ -93,6 +96,8 @@ class MirroredRobot:
         self._pending: deque[tuple[int, Pose2]] = deque(maxlen=_PENDING)
         self._stuck: dict[str, int] = {}
         """For how many ticks the virtual robot has touched what, while it was left behind."""
+        self._invalid_ns: int | None = None
+        """When it was told last of a transform that is no pose."""
         self._latest_ns = -1
         self._physical: Pose2 | None = None
         self._joints: dict[str, float] = {}
@@ -134,7 +139,7 @@ class MirroredRobot:
             clock_bound_s=source.clock_bound_s,
             acknowledged=acknowledged,
             commands=commands,
-            doubts=() if guarded is None else guarded.warnings,
+            doubts=(*(() if guarded is None else guarded.warnings), *self.divergence.doubts),
         )
         return Status(
             robot=self.stack.name,
@@ -235,7 +240,10 @@ class MirroredRobot:
             stamp_ns = ns(item.header.stamp)
             pose = _planar(item.transform)
             if pose is None:
-                self.tell("values", f"a transform from {frames.odom} to {frames.base} that is no pose")
+                now_ns = self.node.now_ns
+                if self._invalid_ns is None or not 0 <= now_ns - self._invalid_ns < _AGAIN_NS:
+                    self._invalid_ns = now_ns
+                    self.tell("values", f"a transform from {frames.odom} to {frames.base} that is no pose")
                 continue
             self.heard_ns = self.node.now_ns
             if stamp_ns <= self._latest_ns:
@@ -282,7 +290,7 @@ class MirroredRobot:
         if self._flows():
             self._relayed.publish(message, frozen=True)
         source = self._commands.source
-        if source is not None and source.gid in self._own_commands():
+        if source is not None and source.gid in self._own_commands:
             self.obedience.command(self.node.now_ns, message.linear.x, message.angular.z)
 
     def _flows(self) -> bool:
@@ -292,6 +300,7 @@ class MirroredRobot:
         """
         return self.heard_ns is None or self.node.now_ns - self.heard_ns < LabelConfig.fresh_s * 1e9
 
+    @cached_property
     def _own_commands(self) -> set[bytes]:
         """Return who commands the physical robot from this process."""
         ends = [end for node in self.node.bus.nodes for end in node.endpoints]
