@@ -27,15 +27,29 @@ _LEGEND_ROOM = 1.35
 """How much longer than the run the time axis of a plot is, so that the legend covers no curve."""
 
 
-def layout(stage: Stage, robots: Sequence[RobotBox], end_ns: int | None = None) -> rrb.Blueprint:
+def layout(
+    stage: Stage, robots: Sequence[RobotBox], end_ns: int | None = None, *, mirrors: bool = False
+) -> rrb.Blueprint:
     """Return the screen: 3-D, mission, plots on the left; close-up, map, verdict and log on the right.
 
     Args:
         stage: The floor to show.
         robots: Each has a close-up.
         end_ns: Simulated time at which the recording ends [ns]; None: it goes on.
+        mirrors: How far virtual and physical robots are apart comes before the joints, and the status of
+            the mirror before the verdict.
     """
     names = [box.robot for box in robots]
+    plots = [
+        _plot("Joints [m, rad]", [f"/joints/{name}/**" for name in names], end_ns),
+        _plot("Localisation error [m, rad]", [f"/localisation/{name}/**" for name in names], end_ns),
+    ]
+    texts = [rrb.TextDocumentView(name="Verdict", origin="/verdict"), _log()]
+    if mirrors:
+        apart = _plot("Divergence [m, rad]", [f"/divergence/{name}/**" for name in names], end_ns)
+        # Where the virtual robot is believed to be is no error: it is where the physical one is seen.
+        plots = [apart, plots[0]]
+        texts.insert(0, rrb.TextDocumentView(name="Mirror", origin="/mirror/status"))
     left = rrb.Vertical(
         _simulation(stage, names),
         _mission(names, end_ns),
@@ -44,10 +58,7 @@ def layout(stage: Stage, robots: Sequence[RobotBox], end_ns: int | None = None) 
                 _plot("Forward velocity [m/s]", [f"/velocity/{name}/linear/**" for name in names], end_ns),
                 _plot("Turning velocity [rad/s]", [f"/velocity/{name}/angular/**" for name in names], end_ns),
             ),
-            rrb.Tabs(
-                _plot("Joints [m, rad]", [f"/joints/{name}/**" for name in names], end_ns),
-                _plot("Localisation error [m, rad]", [f"/localisation/{name}/**" for name in names], end_ns),
-            ),
+            rrb.Tabs(*plots),
         ),
         row_shares=[5, 1.8, 2.6],
     )
@@ -55,7 +66,7 @@ def layout(stage: Stage, robots: Sequence[RobotBox], end_ns: int | None = None) 
     right = rrb.Vertical(
         *close_ups,
         _from_above(names),
-        rrb.Tabs(rrb.TextDocumentView(name="Verdict", origin="/verdict"), _log()),
+        rrb.Tabs(*texts),
     )
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[5, 3]),

@@ -28,6 +28,8 @@ _UNITS = (
     (r"/velocity/.*/angular/.*", "rad/s"),
     (r"/localisation/.*/position_error", "m"),
     (r"/localisation/.*/yaw_error", "rad"),
+    (r"/divergence/.*/position", "m"),
+    (r"/divergence/.*/yaw", "rad"),
     (r".* Transform3D:translation", "m"),
 )
 """Of numbers, by entity, or entity and component."""

@@ -112,6 +112,8 @@ class RerunSink:
         self._block_end = self._written = _Moment(0, 0)
         self._under_way = False
         self._closed = False
+        self.mirrors = False
+        """Whether the screen is that of a mirror; to be set before the file is opened."""
 
     def declare(self, world: World, wheels: Mapping[str, Collection[str]] = NO_WHEELS) -> None:
         """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
@@ -135,7 +137,7 @@ class RerunSink:
         frames = Frames(world.body_names)
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
         self._stage: Stage = Stage(world, shapes, self._robots)
-        blueprint = layout(self._stage, self._robots)
+        blueprint = layout(self._stage, self._robots, mirrors=self.mirrors)
         self._recording: rr.RecordingStream = open_recording(self._target, *self._ids, blueprint)
         self._poses: Poses = Poses(
             world.body_names,
@@ -219,7 +221,7 @@ class RerunSink:
             self._stage.fit()
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-            blueprint = layout(self._stage, self._robots, self._world.time_ns)
+            blueprint = layout(self._stage, self._robots, self._world.time_ns, mirrors=self.mirrors)
             with handed_over(blueprint):
                 self._recording.send_blueprint(blueprint)
         finally:

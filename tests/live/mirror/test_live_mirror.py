@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 from tests.cable import Cable
@@ -13,6 +14,7 @@ from twin.bridge.wire.session import SessionConfig
 from twin.geometry import Pose2
 from twin.live.mirror.live_source import LiveSource
 from twin.live.mirror.mirror import Mirror
+from twin.recording.read_back import read
 from twin.scenario.schema import load
 
 LONG_S = 100.0
@@ -22,9 +24,9 @@ TICK_S = 0.02
 class Watched:
     """A mirror of the figure of eight, whose mission runs here, and what it was at each tick."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self, endpoint: str, out: Path | None = None) -> None:
         source = LiveSource(SessionConfig(mode="client", connect=(endpoint,)))
-        self.mirror = Mirror(load("diff_bot_figure8"), source, autonomy="all")
+        self.mirror = Mirror(load("diff_bot_figure8"), source, autonomy="all", out=out)
         (self.robot,) = self.mirror.robots
         self.world = self.mirror.run.run.world
         self.ticks: list[tuple[float, str, float | None, Pose2]] = []
@@ -54,10 +56,12 @@ class Watched:
         self.mirror.close()
 
 
-def test_a_cut_link_degrades_it_at_once_and_it_comes_back_without_a_jump(endpoint: str) -> None:
+def test_a_cut_link_degrades_it_at_once_and_it_comes_back_without_a_jump(
+    endpoint: str, tmp_path: Path
+) -> None:
     with program("plant", "diff_bot_figure8", "--listen", endpoint):
         wait_for_listener(endpoint)
-        with closing(Cable(endpoint)) as cable, closing(Watched(cable.endpoint)) as watched:
+        with closing(Cable(endpoint)) as cable, closing(Watched(cable.endpoint, tmp_path)) as watched:
             assert watched.until(lambda: watched.label == "twin"), watched.mirror.statuses()
             cable.whole.clear()
             before = len(watched.ticks)
@@ -70,6 +74,9 @@ def test_a_cut_link_degrades_it_at_once_and_it_comes_back_without_a_jump(endpoin
             poses = [pose for _, _, _, pose in watched.ticks[before:]]
             assert max(a.distance(b) for a, b in itertools.pairwise(poses)) < TICK_S * (0.5 + 0.6)
             assert watched.robot.follower.resets == resets
+    recording = read(tmp_path / "diff_bot_figure8.rrd")
+    assert {"twin", "shadow"} <= set(recording.table("/mission/label")["state"].to_pylist())
+    assert "/velocity/diff_bot/linear/measured" in recording.entities, "what came through the link is shown"
 
 
 def test_a_robot_that_starts_again_is_followed_again_and_that_is_told(endpoint: str) -> None:

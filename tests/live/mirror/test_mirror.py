@@ -6,6 +6,7 @@ import bisect
 import csv
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -192,6 +193,12 @@ def test_a_recording_shows_both_robots_and_the_label_on_one_time_line(
     for entity in ("/trails/diff_bot/odometry", "/trails/diff_bot/truth", "/estimate/diff_bot"):
         assert entity in recording.entities
     assert recording.table("/mission/label")["state"].to_pylist() == ["shadow"]
+    *_, told = recording.table("/mirror/status")["text"].to_pylist()
+    assert re.search(
+        r"diff_bot  SHADOW\n  because .*\n  physical .*\n  virtual .*\n  difference ", told, re.S
+    )
+    _, apart = recording.scalars("/divergence/diff_bot/position")
+    assert 0.0 < max(apart) < 0.05
 
 
 def test_numbers_that_are_none_are_told_once_and_forbid_to_speak_of_a_twin(

@@ -15,6 +15,7 @@ from twin.live.mirror.robot import COMMANDED, MirroredRobot
 from twin.live.mirror.shown import Shown
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status, to_array, worst
+from twin.live.mirror.status_text import status_text
 from twin.live.mirror.verdict import mirror_verdict
 from twin.runtime.open_run import OpenRun
 from twin.runtime.stacks.context import Layout
@@ -64,7 +65,7 @@ class Mirror:
             "duration": _FOR_EVER_S,
         }
         self.source, self.clock = source, FollowedClock(source.start_ns)
-        shown = Shown(NAMESPACE)
+        self._shown = shown = Shown(NAMESPACE)
         with ExitStack() as ending:
             ending.callback(source.close)
             self.run = OpenRun(
@@ -142,6 +143,7 @@ class Mirror:
 
     def _tell(self, statuses: list[Status]) -> None:
         self._diagnostics.publish(to_array(statuses, self.clock.now_ns))
+        self._shown.tell(status_text(statuses))
         label = worst(statuses)
         self._seconds[label] = self._seconds.get(label, 0.0) + _STATUS_NS * 1e-9
         if label != self._told:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+from twin.bridge.msgs import String
 from twin.bridge.topics import Subscription
 from twin.errors import BridgeError
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 LABEL = "/mission/label"
 """The label stands beside what the mission is at."""
+_STATUS = "/mirror/status"
+_DIVERGENCE = "divergence/"
 
 
 class _Shown:
@@ -33,7 +36,7 @@ class _Shown:
 
 
 class Shown:
-    """Passes messages on to a recording: at simulated time, without the virtual robot's own."""
+    """Passes messages on to a recording, at simulated time; of the virtual robot only how far off it is."""
 
     def __init__(self, namespace: str) -> None:
         """Take the namespace of virtual robots."""
@@ -44,7 +47,7 @@ class Shown:
 
     def tap(self, sink: RerunSink) -> Any:
         """Return what takes the samples of this process."""
-        self._sink = sink
+        self._sink, sink.mirrors = sink, True
         return self._on_sample
 
     def begin(self, world: World) -> None:
@@ -62,17 +65,27 @@ class Shown:
         self._latest[key] = source.sequence
         msgtype = receiver.codec.msgtype
         if self._sink.shows(msgtype):
-            payload = arrival.data.payload.to_bytes()
+            payload, _ = arrival.data
             try:
                 message = receiver.codec.decode(payload)
             except BridgeError:
                 return  # whoever reads it says so
             self._show(receiver.name, SimpleNamespace(msgtype=msgtype, message=message, payload=payload))
 
+    def tell(self, text: str) -> None:
+        """Show how the robots are mirrored, in a text of fixed width."""
+        if self._sink is not None and self._world is not None:
+            message, msgtype = String(data=f"```\n{text}\n```"), "std_msgs/msg/String"
+            self._show(_STATUS, SimpleNamespace(msgtype=msgtype, message=message, payload=b""))
+
     def _on_sample(self, sample: Sample[Any]) -> None:
         if sample.topic == self._label:
             self._show(LABEL, sample)
-        elif not sample.topic.startswith(self._own):
+        elif sample.topic.startswith(self._own):
+            name = sample.topic.removeprefix(self._own)
+            if _DIVERGENCE in name:
+                self._show(f"/{name}", sample)
+        else:
             self._show(sample.topic, sample)
 
     def _show(self, topic: str, sample: Any) -> None:

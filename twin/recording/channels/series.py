@@ -1,4 +1,4 @@
-"""Messages that are plotted or listed over time: velocities, joints, states, log."""
+"""Messages that are plotted or listed over time: velocities, joints, numbers, states, texts, log."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ LOG_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "CRITICAL"}
 """rcl_interfaces/msg/Log to Rerun."""
 _STATE = Component(rr.StateChange, "state")
 _TEXT, _LEVEL = (Component(rr.TextLog, name) for name in ("text", "level"))
+_DOCUMENT = Component(rr.TextDocument, "text")
 
 
 class VelocityChannel(Channel[tuple[int, float, float]]):
@@ -83,6 +84,43 @@ class JointChannel(Channel[tuple[int, tuple[str, ...], Array]]):
             look = rr.SeriesLines(names=[name.removesuffix("_joint")], colors=[self._palette.colour(name)])
             self.recording.log(self._entities[name], look, static=True)
         return self._entities[name]
+
+
+class NumberChannel(Channel[tuple[int, float]]):
+    """std_msgs/Float64 as a series of its robot, named as the topic."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        super().__init__(context, namespace, topic)
+        kind, name = topic.rsplit("/", 2)[1:]
+        self._entity = f"/{kind}/{self.robot}/{name}"
+        self.recording.log(self._entity, rr.SeriesLines(names=[name]), static=True)
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Keep the number."""
+        self.rows.append((sample.time_ns, sample.message.data))
+
+    def chunks(self, rows: list[tuple[int, float]]) -> Iterator[Chunk]:
+        """Yield the series."""
+        times, values = zip(*rows, strict=True)
+        yield from scalars(sim_time(times), {self._entity: values})
+
+
+class DocumentChannel(Channel[tuple[int, str]]):
+    """std_msgs/String as Markdown to read, as it was last."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        super().__init__(context, namespace, topic)
+        markdown = rr.TextDocument.from_fields(media_type=rr.MediaType.MARKDOWN)
+        self.recording.log(topic, markdown, static=True)
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Keep the text."""
+        self.rows.append((sample.time_ns, sample.message.data))
+
+    def chunks(self, rows: list[tuple[int, str]]) -> Iterator[Chunk]:
+        """Yield the texts."""
+        times, texts = zip(*rows, strict=True)
+        yield self.topic, sim_time(times), (_DOCUMENT.column(texts),)
 
 
 class StateChannel(Channel[tuple[int, str]]):

@@ -6,7 +6,14 @@ from typing import Any
 
 from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
-from twin.recording.channels.series import JointChannel, LogChannel, StateChannel, VelocityChannel
+from twin.recording.channels.series import (
+    DocumentChannel,
+    JointChannel,
+    LogChannel,
+    NumberChannel,
+    StateChannel,
+    VelocityChannel,
+)
 from twin.recording.channels.spatial import (
     GridChannel,
     GridUpdateChannel,
@@ -31,6 +38,9 @@ _BY_NAME: dict[tuple[str, str], type[Any]] = {
     ("tf", "tf2_msgs/msg/TFMessage"): BeliefChannel,
     ("mission/state", "std_msgs/msg/String"): StateChannel,
     ("mission/label", "std_msgs/msg/String"): StateChannel,
+    ("mirror/status", "std_msgs/msg/String"): DocumentChannel,
+    ("divergence/position", "std_msgs/msg/Float64"): NumberChannel,
+    ("divergence/yaw", "std_msgs/msg/Float64"): NumberChannel,
 }
 
 SHOWN_TYPES = frozenset(_BY_TYPE) | {msgtype for _, msgtype in _BY_NAME}
