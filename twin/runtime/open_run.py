@@ -89,6 +89,7 @@ class OpenRun:
         viewer: str | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
+        comparable: bool = True,
         shown: Callable[[RerunSink], Callable[[Sample[Any]], None]] = lambda sink: sink.on_sample,
     ) -> None:
         """Build everything, up to the first tick.
@@ -114,6 +115,8 @@ class OpenRun:
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
+            comparable: Whether the hashes of each second are kept, for `twin diff`. They grow with the run:
+                one without an end does not keep them.
             shown: Returns what passes samples on to the recording.
 
         Raises:
@@ -129,6 +132,7 @@ class OpenRun:
         self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
+        self._comparable = comparable
         self.between_ticks: list[Callable[[], None]] = []
         """Called after each tick of `advance`."""
         self._thought = False
@@ -178,7 +182,7 @@ class OpenRun:
                 world = parts.world
                 self.run.wait = lambda: kept.keep(world.time_ns * 1e-9)
             self._ending = ending.pop_all()
-            if out is not None:
+            if out is not None and comparable:
                 self._ending.callback(lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
 
@@ -209,7 +213,7 @@ class OpenRun:
         with self._executed.going_on(), self._timed():
             while not run.over:
                 run.tick()
-                if run.world.time_ns >= self.digest.second_ends_ns:
+                if self._comparable and run.world.time_ns >= self.digest.second_ends_ns:
                     self.digest.end_second(run.world.state_digest())
                 for each in self.between_ticks:
                     each()

@@ -75,6 +75,7 @@ class Followed:
             self.events = robot.events
             self.judgement = mirror.statuses()[0].judgement
             self.report = robot.divergence.monitor.report()
+            self.hashes = mirror.run.digest.stream
 
 
 @pytest.fixture(scope="module")
@@ -154,6 +155,10 @@ def test_a_bag_of_a_mirror_is_mirrored_again(
         past_statuses(tmp_path / "own", 60.0)
     with pytest.raises(RecordingError, match="no mirror has told of itself there"):
         past_statuses(recorded / "bag", 1.0)
+
+
+def test_what_may_go_on_for_months_keeps_nothing_of_each_second(followed: Followed) -> None:
+    assert followed.hashes == []
 
 
 def test_no_bag_is_refused_in_a_sentence(scenario: Scenario) -> None:

@@ -77,6 +77,7 @@ class Mirror:
                 bag=bag,
                 clock=self.clock,
                 shown=shown.tap,
+                comparable=False,
                 layout=Layout(
                     autonomy=autonomy, hardware=NAMESPACE, commands="" if guard is None else COMMANDED
                 ),
