@@ -1,4 +1,6 @@
-"""Makes the pictures: of robots and an environment without arguments, README's of a recording as argument.
+"""Makes the pictures of robots and an environment, or of a recording, whose name and time follow.
+
+python docs/pictures.py runs/warehouse/1 warehouse.png 45
 
 MuJoCo draws them without a display (EGL), the Rerun viewer the recording without a window (Vulkan).
 """
@@ -104,7 +106,7 @@ def save(picture: Image.Image, file: Path, colours: int = 256) -> None:
     picture.convert("RGB").quantize(colours, kmeans=1, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
-def screen(recording: Path, file: Path, *, time_s: float = 45.0, width: int = 1100) -> None:
+def screen(recording: Path, file: Path, *, time_s: float, width: int = 1100) -> None:
     """Write the recording's first screen at a time, without the window's own bars."""
     with tempfile.TemporaryDirectory() as folder:
         shot = Path(folder) / "screen.png"
@@ -116,7 +118,7 @@ def screen(recording: Path, file: Path, *, time_s: float = 45.0, width: int = 11
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        screen(Path(sys.argv[1]), DOCS / "warehouse.png")
+        screen(Path(sys.argv[1]), DOCS / sys.argv[2], time_s=float(sys.argv[3]))
     else:
         for robot, shot in SHOTS.items():
             save(draw(robot, shot), DOCS / "robots" / f"{robot}.png")

@@ -57,6 +57,7 @@ NOT_RUN = {
     r"twin report runs/all": "tests/runtime/test_shipped_scenarios.py does that",
     r"twin run scenarios/warehouse_(lidar_lost|kidnapped|slam)\.yaml .*": "so do all that ship, there",
     r"source \.venv/bin/activate": "the tests run in an environment already",
+    r"twin play .* --screenshot .*": "needs a Vulkan driver: tests/recording/test_player.py does that",
     r"twin play (--web )?\S+": "needs a display, or a browser: only its options are looked at",
     r"twin topic (pub -r|hz|bw|throttle) [^-]*( -s)?": "goes on until Ctrl-C; tests/cli/ros does that",
     r"python examples/learning/learn_goal\.py .*": "takes minutes: tests/examples learns less",

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from twin.errors import RecordingError
 from twin.recording import player
@@ -28,10 +30,22 @@ def test_screen_has_no_errors(recorded: Any, time_s: float) -> None:
 
 
 @needs_vulkan
-def test_screenshot(recorded: Any, tmp_path: Path) -> None:
-    player.screenshot(recorded.path, tmp_path / "shot.png", time_s=2.0, view="Map")
-    assert (tmp_path / "shot.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "shot.png").stat().st_size > 5_000
+def test_a_picture_shows_one_view_at_a_time(recorded: Any, tmp_path: Path) -> None:
+    pictures = []
+    for time_s in (0.0, 2.5):
+        file = tmp_path / f"{time_s}.png"
+        player.screenshot(recorded.path, file, time_s=time_s, view="Map")
+        with Image.open(file) as image:
+            pictures.append(np.asarray(image))
+    assert pictures[0].shape == pictures[1].shape
+    assert (pictures[0] != pictures[1]).any()
+
+
+@needs_vulkan
+def test_a_view_that_is_not_there_is_told_of(recorded: Any, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no view 'Mab' in .*; valid: .*Map"):
+        player.screenshot(recorded.path, tmp_path / "shot.png", view="Mab")
+    assert not (tmp_path / "shot.png").exists()
 
 
 def test_missing_file(tmp_path: Path) -> None:

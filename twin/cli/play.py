@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from twin.errors import RecordingError
+from twin.files.writing import check_file
 
 
 def play(
@@ -21,12 +22,30 @@ def play(
         bool, typer.Option("--web", help="Serve the viewer to a browser on this computer.")
     ] = False,
     port: Annotated[int, typer.Option(help="Port of the page with --web.")] = 9090,
+    screenshot: Annotated[
+        Path | None,
+        typer.Option(metavar="PNG", help="Write a picture of the screen instead; needs no display."),
+    ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", min=0.0, help="Simulated time of the picture.", show_default="start"),
+    ] = None,
+    view: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="One view, such as Map.", show_default="the whole screen"),
+    ] = None,
 ) -> None:
     """Open a recording in the Rerun viewer."""
     from twin.cli.console import stderr
     from twin.recording import player
 
     file = find_recording(recording)
+    if screenshot is not None:
+        check_file(screenshot, "--screenshot")
+        player.screenshot(file, screenshot, time_s=at, view=view)
+        return
+    if at is not None or view is not None:
+        raise typer.BadParameter("--at and --view are of a picture: add --screenshot PNG")
     raise typer.Exit(
         player.play(file, web=web, port=port, on_ready=lambda url: stderr().print(f"open {url}"))
     )

@@ -14,6 +14,7 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 from twin.errors import RecordingError
+from twin.files.writing import write_whole
 from twin.recording.read_back import check_recording
 
 if TYPE_CHECKING:
@@ -70,8 +71,10 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
         view: Name of one view, such as `Simulation`; None shows the whole window.
 
     Raises:
-        RecordingError: No such recording or view, or no Vulkan driver.
+        RecordingError: No such recording or view, no Vulkan driver, or the picture cannot be written.
     """
+    if png.suffix != ".png":
+        raise RecordingError(f"{png}: not a picture that can be written; valid: *.png")
     with headless_viewer(path, time_s=time_s) as client:
         view_id = None
         if view is not None:
@@ -79,7 +82,8 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
             if view not in found:
                 raise RecordingError(f"no view {view!r} in {path}; valid: {', '.join(sorted(found))}")
             view_id = found[view]
-        png.write_bytes(client.take_screenshot(view_id))
+        picture = client.take_screenshot(view_id)
+    write_whole(png, picture)
 
 
 @contextmanager

@@ -35,6 +35,19 @@ def test_a_bag_is_followed_recorded_and_asked_for_the_past(invoke: Invoke, tmp_p
     assert "  because     a bag obeys no commands\n" in output
 
 
+def test_who_heard_no_robot_fails_if_that_is_judged(invoke: Invoke, tmp_path: Path) -> None:
+    with Plant(load("diff_bot_figure8"), network=SessionConfig(), pace=None, bag=tmp_path / "bag") as robots:
+        robots.advance(lambda: True)
+    pair = tmp_path / "pair.yaml"
+    both = "{model: diff_bot, name: a}, {model: diff_bot, name: b, pose: {x: 2}}"
+    pair.write_text(f"name: pair\nduration: 1 s\nrobots: [{both}]\nchecks: [{{no_collision: }}]\n")
+    words = ["mirror", pair, "--bag", tmp_path / "bag"]
+    assert invoke(*words)[0] == 0, "nothing was judged"
+    code, output, _ = invoke(*words, "--out", tmp_path / "out")
+    assert code == 1
+    assert "no pose of a physical robot was heard" in output
+
+
 def test_mistakes_are_a_sentence(invoke: Invoke, tmp_path: Path) -> None:
     for words, said in (
         (("--seed", "1"), "a scenario, or --status"),

@@ -108,6 +108,7 @@ def mirror(
         verdict.write(out)
         console = stdout()
         console.print(verdict_report(verdict.to_dict(), out, short=console.is_terminal))
+        raise typer.Exit(verdict.exit_code)
 
 
 def _source(bag: Path | None, connect: list[str] | None, domain: int) -> Source:
