@@ -16,6 +16,9 @@ from twin.scenario.signals.topics import TopicReader
 from twin.scenario.temporal import Formula, Margin, Monitor, Predicate
 from twin.scenario.temporal.formula import Value, begins_ns
 
+_AT_ONCE = 64
+"""Values that are judged in one go: one by one, between other work, that costs more."""
+
 
 class SignalCheck(Check):
     """Judges a formula by a monitor, and gives it the signals that it is about."""
@@ -30,6 +33,8 @@ class SignalCheck(Check):
         self._signals: dict[str, Signal] = {}
         self.topics: dict[str, TopicReader] = {}
         self._unseen = dict.fromkeys(self._monitor.signals)
+        self._waiting: list[tuple[str, int, Value]] = []
+        """Values of signals that are not judged yet; where an observation ends, one of no signal."""
         for text in self._monitor.signals:
             reference = self.reference(text)
             if reference.field is None:
@@ -83,28 +88,43 @@ class SignalCheck(Check):
 
     def take(self, signal: str, time_ns: int, value: Value) -> None:
         """Take a value of a signal."""
-        self._unseen.pop(signal, None)
-        self._monitor.take(signal, time_ns, value)
+        self._waiting.append((signal, time_ns, value))
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        self._last_s = observation.time_s
+        time_ns = observation.time_ns
         for text, signal in self._signals.items():
             value = signal.value(observation)
             if value is not None:
-                self.take(text, observation.time_ns, value)
-        # What is published next may have this very time; of the truth there is no more of it.
-        self._monitor.know(observation.time_ns + (not self.topics))
-        if self._at_s is None and self._monitor.verdict is not None:
-            self._at_s = observation.time_s
+                self.take(text, time_ns, value)
+        self.take("", time_ns, True)
+        if len(self._waiting) >= _AT_ONCE:
+            self._judge()
+
+    def _judge(self) -> None:
+        """Judge what waits."""
+        monitor = self._monitor
+        for signal, time_ns, value in self._waiting:
+            if signal:
+                self._unseen.pop(signal, None)
+                monitor.take(signal, time_ns, value)
+                continue
+            # What is published next may have this very time; of the truth there is no more of it.
+            monitor.know(time_ns + (not self.topics))
+            self._last_s = time_ns / 1e9
+            if self._at_s is None and monitor.verdict is not None:
+                self._at_s = self._last_s
+        self._waiting.clear()
 
     @property
     def decided(self) -> bool | None:
         """Whether it holds, whatever comes; None: that is open."""
+        self._judge()
         return self._monitor.verdict
 
     def result(self) -> CheckResult:
         """Return the outcome, the run being over; value, limit and unit are those of the worst moment."""
+        self._judge()
         begin = begins_ns(self._formula) / 1e9
         at_s = self._last_s if self._at_s is None else self._at_s
         if self._last_s is None:
