@@ -17,7 +17,7 @@ from twin.scenario.temporal import Formula, Margin, Monitor, Predicate
 from twin.scenario.temporal.formula import Value, begins_ns
 
 _AT_ONCE = 64
-"""Values that are judged in one go: one by one, between other work, that costs more."""
+"""Observations and values that are judged in one go: one by one, between other work, that costs more."""
 
 
 class SignalCheck(Check):
@@ -33,8 +33,8 @@ class SignalCheck(Check):
         self._signals: dict[str, Signal] = {}
         self.topics: dict[str, TopicReader] = {}
         self._unseen = dict.fromkeys(self._monitor.signals)
-        self._waiting: list[tuple[str, int, Value]] = []
-        """Values of signals that are not judged yet; where an observation ends, one of no signal."""
+        self._waiting: list[Observation | tuple[str, int, Value]] = []
+        """What is not judged yet, in order: observations, and values of topics with their signal and time."""
         for text in self._monitor.signals:
             reference = self.reference(text)
             if reference.field is None:
@@ -92,29 +92,35 @@ class SignalCheck(Check):
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        time_ns = observation.time_ns
-        for text, signal in self._signals.items():
-            value = signal.value(observation)
-            if value is not None:
-                self.take(text, time_ns, value)
-        self.take("", time_ns, True)
+        self._waiting.append(observation)
         if len(self._waiting) >= _AT_ONCE:
             self._judge()
 
     def _judge(self) -> None:
         """Judge what waits."""
-        monitor = self._monitor
-        for signal, time_ns, value in self._waiting:
-            if signal:
-                self._unseen.pop(signal, None)
-                monitor.take(signal, time_ns, value)
-                continue
-            # What is published next may have this very time; of the truth there is no more of it.
-            monitor.know(time_ns + (not self.topics))
-            self._last_s = time_ns / 1e9
-            if self._at_s is None and monitor.verdict is not None:
-                self._at_s = self._last_s
-        self._waiting.clear()
+        waiting, self._waiting = self._waiting, []
+        for each in waiting:
+            if isinstance(each, Observation):
+                self.look(each)
+            else:
+                self._give(*each)
+
+    def look(self, observation: Observation) -> None:
+        """Judge one observation, after all that came before it."""
+        time_ns, monitor = observation.time_ns, self._monitor
+        for text, signal in self._signals.items():
+            value = signal.value(observation)
+            if value is not None:
+                self._give(text, time_ns, value)
+        # What is published next may have this very time; of the truth there is no more of it.
+        monitor.know(time_ns + (not self.topics))
+        self._last_s = observation.time_s
+        if self._at_s is None and monitor.verdict is not None:
+            self._at_s = observation.time_s
+
+    def _give(self, signal: str, time_ns: int, value: Value) -> None:
+        self._unseen.pop(signal, None)
+        self._monitor.take(signal, time_ns, value)
 
     @property
     def decided(self) -> bool | None:
@@ -158,10 +164,10 @@ class RobotSignalCheck(SignalCheck):
         self._motion = BaseMotion()
         super().__init__(name, config, context)
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
+    def look(self, observation: Observation) -> None:
+        """Judge one observation, after all that came before it."""
         self._motion.take(observation.robots[self.robot].pose)
-        super().observe(observation)
+        super().look(observation)
 
     def nothing(self) -> str:
         """Return that the base stood."""
