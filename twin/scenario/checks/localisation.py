@@ -51,9 +51,9 @@ class LocalisationError(RobotSignalCheck):
             return f"{NOTHING}the run ended before {self.config.after:g} s"
         return f"{self.robot} published no estimate of its pose"
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        super().observe(observation)
+    def look(self, observation: Observation) -> None:
+        """Judge one observation, after all that came before it."""
+        super().look(observation)
         self._believed = self._believed or observation.robots[self.robot].estimate is not None
 
     _believed = False

@@ -16,6 +16,9 @@ from twin.scenario.signals.topics import TopicReader
 from twin.scenario.temporal import Formula, Margin, Monitor, Predicate
 from twin.scenario.temporal.formula import Value, begins_ns
 
+_AT_ONCE = 64
+"""Observations and values that are judged in one go: one by one, between other work, that costs more."""
+
 
 class SignalCheck(Check):
     """Judges a formula by a monitor, and gives it the signals that it is about."""
@@ -30,6 +33,8 @@ class SignalCheck(Check):
         self._signals: dict[str, Signal] = {}
         self.topics: dict[str, TopicReader] = {}
         self._unseen = dict.fromkeys(self._monitor.signals)
+        self._waiting: list[Observation | tuple[str, int, Value]] = []
+        """What is not judged yet, in order: observations, and values of topics with their signal and time."""
         for text in self._monitor.signals:
             reference = self.reference(text)
             if reference.field is None:
@@ -83,28 +88,49 @@ class SignalCheck(Check):
 
     def take(self, signal: str, time_ns: int, value: Value) -> None:
         """Take a value of a signal."""
-        self._unseen.pop(signal, None)
-        self._monitor.take(signal, time_ns, value)
+        self._waiting.append((signal, time_ns, value))
 
     def observe(self, observation: Observation) -> None:
         """Take one observation."""
-        self._last_s = observation.time_s
+        self._waiting.append(observation)
+        if len(self._waiting) >= _AT_ONCE:
+            self._judge()
+
+    def _judge(self) -> None:
+        """Judge what waits."""
+        waiting, self._waiting = self._waiting, []
+        for each in waiting:
+            if isinstance(each, Observation):
+                self.look(each)
+            else:
+                self._give(*each)
+
+    def look(self, observation: Observation) -> None:
+        """Judge one observation, after all that came before it."""
+        time_ns, monitor = observation.time_ns, self._monitor
         for text, signal in self._signals.items():
             value = signal.value(observation)
             if value is not None:
-                self.take(text, observation.time_ns, value)
+                self._give(text, time_ns, value)
         # What is published next may have this very time; of the truth there is no more of it.
-        self._monitor.know(observation.time_ns + (not self.topics))
-        if self._at_s is None and self._monitor.verdict is not None:
+        monitor.know(time_ns + (not self.topics))
+        self._last_s = observation.time_s
+        if self._at_s is None and monitor.verdict is not None:
             self._at_s = observation.time_s
+
+    def _give(self, signal: str, time_ns: int, value: Value) -> None:
+        self._unseen.pop(signal, None)
+        self._monitor.take(signal, time_ns, value)
 
     @property
     def decided(self) -> bool | None:
         """Whether it holds, whatever comes; None: that is open."""
+        self._judge()
         return self._monitor.verdict
 
     def result(self) -> CheckResult:
         """Return the outcome, the run being over; value, limit and unit are those of the worst moment."""
+        self._judge()
         begin = begins_ns(self._formula) / 1e9
         at_s = self._last_s if self._at_s is None else self._at_s
         if self._last_s is None:
@@ -138,10 +164,10 @@ class RobotSignalCheck(SignalCheck):
         self._motion = BaseMotion()
         super().__init__(name, config, context)
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
+    def look(self, observation: Observation) -> None:
+        """Judge one observation, after all that came before it."""
         self._motion.take(observation.robots[self.robot].pose)
-        super().observe(observation)
+        super().look(observation)
 
     def nothing(self) -> str:
         """Return that the base stood."""

@@ -79,9 +79,9 @@ class Energy(RobotSignalCheck):
         """Return how much it was."""
         return f"{self.robot} used {margin.value:.0f} J"
 
-    def observe(self, observation: Observation) -> None:
-        """Take one observation."""
-        super().observe(observation)
+    def look(self, observation: Observation) -> None:
+        """Judge one observation, after all that came before it."""
+        super().look(observation)
         self._moved = self.robot in observation.moved
 
     def nothing(self) -> str:

@@ -128,7 +128,8 @@ class _Always(_Node):
         part.work()
         while part.changes:
             begin, margin = part.changes.popleft()
-            self._slide(begin)
+            if begin - self._window.high > self._next:
+                self._slide(begin)
             while least and least[-1][1].size > margin.size:
                 begin = least.pop()[0]
             if not least or begin <= self._last_left:
