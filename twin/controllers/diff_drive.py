@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from twin.controllers.limiter import AxisLimits, SpeedLimiter
 from twin.parameters import MayBeInfinite, Metres, Name, Positive, RadiansPerSecond, Seconds
@@ -34,8 +34,7 @@ class DiffDriveConfig:
     """Without a command for this long the robot is brought to a stop."""
 
 
-@dataclass(frozen=True)
-class WheelCommand:
+class WheelCommand(NamedTuple):
     """Set-points for the wheels of each side [rad/s]."""
 
     left: float

@@ -84,6 +84,9 @@ class Hardware:
         """Bind the names of a robot to a compiled model; commands take `command_latency` [s]."""
         self.config = config or HardwareConfig()
         self._model, self._data = model, data
+        # Views, made once: to ask MuJoCo for an array takes longer than to read a few numbers of it.
+        self._all_qpos, self._all_qvel, self._all_ctrl = data.qpos, data.qvel, data.ctrl
+        self._all_efforts = data.qfrc_actuator
         self._timestep = float(model.opt.timestep)
         self.joint_names = tuple(name for name, joint in description.joints.items() if joint.type in ONE_DOF)
         joints = [model.joint(f"{robot}/{name}") for name in self.joint_names]
@@ -166,21 +169,21 @@ class Hardware:
         step = round(self._data.time / self._timestep)
         if step == self._step:
             return self._reading
-        data, tick, n = self._data, self._tick, len(self.joint_names)
+        tick, n = self._tick, len(self.joint_names)
         elapsed = (step - self._step) * self._timestep
         noise = self._noise_stddev * self._noise.normal(step, 2 * n)
         position, velocity = noise[:n], noise[n:]
-        position += data.qpos[self._qpos]
-        velocity += data.qvel[self._dof]
+        position += self._all_qpos[self._qpos]
+        velocity += self._all_qvel[self._dof]
         for i in self._encoders:  # one by one: for a few wheels arrays cost several times as much
             count = self._count(i)
             position[i], velocity[i] = count * tick, (count - self._counts[i]) * (tick / elapsed)
             self._counts[i] = count
-        effort = data.qfrc_actuator[self._drive_dof] * self._drive_share
+        effort = self._all_efforts[self._drive_dof] * self._drive_share
         reading: JointReading | None = _reading(position, velocity, effort)
         for passed in self.filters:
             if reading is not None:
-                reading = passed(reading, round(data.time * 1e9))
+                reading = passed(reading, round(self._data.time * 1e9))
         self._step, self._reading = step, self._reading if reading is None else reading
         return self._reading
 
@@ -268,10 +271,11 @@ class Hardware:
         commands = [*(self._arrived() if self._latency_steps else self._commands)]
         for index, gear in self._gears.items():
             commands[index] *= gear.product
-        self._wheels.apply(commands)
-        self._positions.apply(commands)
+        now = self._data.time
+        self._wheels.apply(commands, now)
+        self._positions.apply(commands, now)
         self._efforts.apply(commands)
-        self._data.ctrl[self._ctrl] = commands
+        self._all_ctrl[self._ctrl] = commands
 
     def miscount(self, joint: str, angle: float) -> None:
         """Let the encoder of a joint jump, as one does that lost its power or picked up a disturbance.
@@ -340,7 +344,7 @@ class Hardware:
 
     def angle(self, joint: str) -> float:
         """Return where a joint truly is [rad] or [m]."""
-        return float(self._data.qpos[self._qpos][self.joint_names.index(joint)])
+        return float(self._all_qpos[self._qpos][self.joint_names.index(joint)])
 
     def ordered(self, joint: str) -> float:
         """Return the last command for a joint."""
@@ -384,7 +388,7 @@ class Hardware:
         self._wheels.reset()
 
     def _count(self, joint: int) -> float:
-        angle = self._data.qpos.item(self._encoders[joint])
+        angle = self._all_qpos.item(self._encoders[joint])
         return round(angle * self._scale[joint] / self._tick) + self._miscounted[joint]
 
 
@@ -407,6 +411,7 @@ class _WheelServos:
     ) -> None:
         """Bind to those of a robot's actuators that turn wheels; `gain` of the integral [1/s]."""
         self._model, self._data, self._gain = model, data, gain
+        self._all_qpos, self._all_qvel = data.qpos, data.qvel
         self._which: list[int] = np.flatnonzero(turning).tolist()
         self._drives = actuators = actuators[turning]
         joints = model.actuator_trnid[actuators, 0]
@@ -419,7 +424,7 @@ class _WheelServos:
         """Owe nothing; to be called when the state was set from outside."""
         self._command = [0.0] * len(self._which)
         self._owed = [0.0] * len(self._which)
-        self._position: list[float] = self._data.qpos[self._qpos].tolist()
+        self._position: list[float] = self._all_qpos[self._qpos].tolist()
         self._time = float(self._data.time)
 
     def limit(self, actuator: int, torque: float) -> None:
@@ -429,12 +434,10 @@ class _WheelServos:
             limit = min(torque, _joint_limit(self._model, self._drives[i]))
             self._reach[i] = limit / self._damping[i]
 
-    def apply(self, commands: list[float]) -> None:
-        """Add the integral to the commands of the wheels."""
-        data = self._data
-        now = float(data.time)
+    def apply(self, commands: list[float], now: float) -> None:
+        """Add the integral to the commands of the wheels; `now` is the simulated time [s]."""
         elapsed = now - self._time
-        position, speed = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
+        position, speed = self._all_qpos[self._qpos].tolist(), self._all_qvel[self._dof].tolist()
         gain, last, owing, before = self._gain, self._command, self._owed, self._position
         # Numbers one by one: for a few wheels arrays cost five times as much, and min and max as much again.
         for i, actuator in enumerate(self._which):

@@ -77,7 +77,8 @@ class PositionServos:
         savings: Savings = ALL,
     ) -> None:
         """Bind to those of `actuators` that `keep_velocity_limit` made; changes `slewmax` in `model`."""
-        self._data, self._always = data, not savings.unchanged_drives
+        self._all_qpos, self._all_qvel, self._all_act = data.qpos, data.qvel, data.act  # views, made once
+        self._always = not savings.unchanged_drives
         is_kept = model.actuator_dyntype[actuators] == mujoco.mjtDyn.mjDYN_PID
         kept = actuators[is_kept]
         joints = model.actuator_trnid[kept, 0]
@@ -92,15 +93,13 @@ class PositionServos:
         self._ahead: list[float] = ahead.tolist()
         self._time = float(data.time)
 
-    def apply(self, commands: list[float]) -> None:
-        """Bound targets and the robot's commands; called once a tick."""
+    def apply(self, commands: list[float], now: float) -> None:
+        """Bound targets and the robot's commands; called once a tick, at the simulated time `now` [s]."""
         if not self._which:
             return
-        data = self._data
-        now = float(data.time)
         elapsed, self._time = now - self._time, now
-        position, velocity = data.qpos[self._qpos].tolist(), data.qvel[self._dof].tolist()
-        before = data.act[self._target].tolist()
+        position, velocity = self._all_qpos[self._qpos].tolist(), self._all_qvel[self._dof].tolist()
+        before = self._all_act[self._target].tolist()
         targets, speeds = before.copy(), self._speeds.copy()
         # Numbers one by one: for a few joints arrays cost several times as much, and min and max again.
         for i, which in enumerate(self._which):
@@ -117,7 +116,7 @@ class PositionServos:
                 speeds[i] = fastest if fastest < speed else speed
         # An arm is at rest most of the time: what is as it was is not written again.
         if targets != before or self._always:
-            data.act[self._target] = targets
+            self._all_act[self._target] = targets
         if speeds != self._speeds or self._always:
             self._slewmax[self._kept], self._speeds = speeds, speeds
 

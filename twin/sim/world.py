@@ -142,7 +142,7 @@ class World:
 
     def body_poses(self) -> tuple[Array, Array]:
         """Return xyz, shape (n, 3) [m], and quat_wxyz, shape (n, 4), of `body_names` in the world frame."""
-        return self.data.xpos[self._body_ids], self.data.xquat[self._body_ids]
+        return self._xpos[self._body_ids], self._xquat[self._body_ids]
 
     def pose(self, body: str) -> Pose3:
         """Return the true pose of a link `<robot>/<link>`, of goods or of a static in the world frame.
@@ -152,7 +152,7 @@ class World:
         """
         index = self._index.get(body)
         if index is not None:
-            return Pose3(self.data.xpos[index].copy(), self.data.xquat[index].copy())
+            return Pose3(self._xpos[index].copy(), self._xquat[index].copy())
         if body in self._statics:
             return self._statics[body]
         raise ScenarioError(f"no body '{body}' in the world; {nearest(body, [*self._index, *self._statics])}")
@@ -297,6 +297,7 @@ class World:
         self.body_names = tuple(self._index)
         """The bodies that can move, in the order of `body_poses`: links as `<robot>/<link>`, and goods."""
         self._body_ids = np.array(ids, dtype=np.intp)
+        self._xpos, self._xquat = self.data.xpos, self.data.xquat  # views, made once, as in `Hardware`
         self._placed = {body.name: int(self.model.body(body.name).mocapid[0]) for body in self.scene.placed}
 
     def _geom_owners(self) -> tuple[list[str], list[int]]:

@@ -28,51 +28,51 @@ class Timer:
         self.period_ns = period_ns
         self.last_ns: int | None = None
         """When it called back last [ns]."""
+        self.due_ns = NEVER_NS
+        """When it fires next [ns]."""
         self._callback = callback
         self._clock = clock
         self._rescheduled = rescheduled
         self.reset()
-        self.is_canceled = not autostart
-        """Whether it fires no more, until reset."""
+        if not autostart:
+            self.cancel()
 
     def reset(self) -> None:
         """Fire next at the first multiple of the period after now; also after `cancel`."""
         self._schedule(self._clock.now_ns)
-        self.is_canceled = False
         self._rescheduled()
 
     def cancel(self) -> None:
         """Fire no more, until reset."""
-        self.is_canceled = True
+        self.due_ns = NEVER_NS
 
     @property
-    def due_ns(self) -> int:
-        """When it fires next [ns]."""
-        return NEVER_NS if self.is_canceled else self.next_ns
+    def is_canceled(self) -> bool:
+        """Whether it fires no more, until reset."""
+        return self.due_ns == NEVER_NS
 
     @property
     def is_ready(self) -> bool:
         """Whether it is due."""
-        return not self.is_canceled and self._clock.now_ns >= self.next_ns
+        return self._clock.now_ns >= self.due_ns
 
     @property
     def time_until_next_call(self) -> int | None:
         """How long until it is due [ns], negative if it is late; None if cancelled."""
-        return None if self.is_canceled else self.next_ns - self._clock.now_ns
+        return None if self.is_canceled else self.due_ns - self._clock.now_ns
 
     def run(self, now_ns: int) -> None:
         """Call back if due."""
-        if self.is_canceled:
-            return
-        if now_ns >= self.next_ns:
+        if now_ns >= self.due_ns:
             self._schedule(now_ns)
             self.last_ns = now_ns
             self._callback()
-        elif now_ns < self.next_ns - self.period_ns:  # the clock was set back: a bag played again, a new run
+        elif not self.is_canceled and now_ns < self.due_ns - self.period_ns:
+            # The clock was set back: a bag played again, a new run.
             self._schedule(now_ns)
 
     def _schedule(self, now_ns: int) -> None:
-        self.next_ns = next_due(self.period_ns, now_ns)
+        self.due_ns = next_due(self.period_ns, now_ns)
 
 
 class Rate:
