@@ -178,6 +178,26 @@ def test_what_is_decided_is_known_before_the_end() -> None:
 
 
 @pytest.mark.parametrize(
+    "entry",
+    [
+        {"always": {"signal": "speed", "below": 0.97, "after": "10 s", "before": "150 s"}},
+        {"eventually": {"signal": "speed", "above": 0.9999, "before": "120 s"}},
+        {"formula": "always (speed > 0.9 implies eventually[0, 20] norm(/odom.twist.twist.linear) > 4.9)"},
+        {"formula": "/odom.twist.twist.linear.x > 1 until speed > 0.5"},
+    ],
+)
+def test_what_is_judged_together_is_judged_as_one_by_one(entry: dict[str, Any]) -> None:
+    together, one_by_one = made(entry), made(entry)
+    for t, observation in enumerate(driving(*(math.sin(0.1 * t) for t in range(200)))):
+        for check in (together, one_by_one):
+            check.observe(observation)
+            for topic in check.topics:
+                check.take(topic, t * 10**9 + 7, 5.0 * abs(math.cos(0.07 * t)))
+        assert one_by_one.decided in (None, True, False), "asking judges what waits"
+    assert together.result() == one_by_one.result()
+
+
+@pytest.mark.parametrize(
     ("entry", "message"),
     [
         (
