@@ -62,7 +62,7 @@ class Shown:
         self._latest[key] = source.sequence
         msgtype = receiver.codec.msgtype
         if self._sink.shows(msgtype):
-            payload = arrival.data.payload.to_bytes()
+            payload, _ = arrival.data
             try:
                 message = receiver.codec.decode(payload)
             except BridgeError:
