@@ -1,14 +1,15 @@
-"""A mirror beside a plant of the same process: a tick of one, then a tick of the other, no network between them."""
+"""A mirror beside a plant of the same process, without a network: a tick of one, then one of the other."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
 from types import SimpleNamespace
 from typing import Any, Self
 
 from twin.bridge.cdr.codec import codec
-from twin.bridge.msgs import TFMessage, Twist
+from twin.bridge.msgs import TFMessage, Twist, Vector3
 from twin.bridge.qos import LATCHED, as_qos
 from twin.bridge.wire.session import SessionConfig
 from twin.geometry import Pose2
@@ -24,6 +25,10 @@ from twin.scenario.schema import Scenario
 _START_NS = 1_700_000_000_000_000_000
 _LATE_TICKS = 3
 """So much later messages arrive, on both ways."""
+_BEFORE, _STOPPING = 130, 30
+"""Ticks that the plant has driven before, and those of them in which it comes to rest."""
+_WRONG = Pose2(0.05, 0.05, 0.1)
+"""How wrong it is where the mirror begins."""
 _NOT_CARRIED = ("/rosout", "/parameter_events", "/robot_description", "/tf_static", "/cmd_vel")
 
 
@@ -57,6 +62,16 @@ class PlantSource(Source):
         self._node = run.run.bus.create_node("driver")
         run.run.bus.tap(self._on_commanded)
 
+    def drive(self, ticks: int) -> None:
+        """Let the plant drive a curve, unmirrored, and stop: its odometry does not begin where it is then."""
+        for tick in range(ticks):
+            moves = tick < ticks - _STOPPING
+            self._cmd_vel.publish(
+                Twist(Vector3(0.3 if moves else 0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.4 if moves else 0.0))
+            )
+            self.plant.advance(lambda: True)
+        self._heard = deque((0, sample) for _, sample in self._heard if sample.topic == "/tf_static")
+
     def after_tick(self) -> None:
         self._ticks += 1
         while self._told and self._told[0][0] <= self._ticks:
@@ -89,16 +104,23 @@ class PlantSource(Source):
 
 
 class Beside:
-    """A plant and its mirror."""
+    """A plant that has been under way for a while, and its mirror."""
 
     def __init__(
-        self, scenario: Scenario, *, network: SessionConfig | None = None, **options: Any
+        self,
+        scenario: Callable[[Pose2], Scenario],
+        start: Pose2,
+        *,
+        network: SessionConfig | None = None,
+        **options: Any,
     ) -> None:
         with ExitStack() as ending:
-            self.plant = Plant(scenario, network=SessionConfig(), pace=None, start_ns=_START_NS)
+            self.plant = Plant(scenario(start), network=SessionConfig(), pace=None, start_ns=_START_NS)
             ending.callback(self.plant.close)
             self.source = PlantSource(self.plant, network)
-            self.mirror = ending.enter_context(Mirror(scenario, self.source, **options))
+            self.source.drive(_BEFORE)
+            guess = self.pose(self.plant.run) @ _WRONG
+            self.mirror = ending.enter_context(Mirror(scenario(guess), self.source, **options))
             self._ending = ending.pop_all()
         self.run = self.mirror.run
 
