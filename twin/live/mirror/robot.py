@@ -97,6 +97,8 @@ class MirroredRobot:
         """Time, pose in the odometry's frame, and in the map if the robot is localised."""
         self._T_odom_driven: Pose2 | None = None
         """From where the virtual robot would be without corrections, to the physical one's odometry."""
+        self._driven = Pose2(0.0, 0.0, 0.0)
+        """Where it would be."""
         self._stuck: dict[str, int] = {}
         """For how many ticks the virtual robot has touched what, while it was left behind."""
         self._invalid_ns: int | None = None
@@ -159,11 +161,11 @@ class MirroredRobot:
 
     @property
     def odometry(self) -> Pose2 | None:
-        """What the physical odometry tells now, with what the virtual robot has driven since it was heard."""
-        if self._T_odom_driven is None:
-            return None
-        virtual = self._world.pose(self.stack.handle.base).to_pose2()
-        return self._T_odom_driven @ self.follower.correction.inverse() @ virtual
+        """What the physical odometry tells of the start of this tick, when drives read their encoders, too.
+
+        It is what was heard last, and what the virtual robot has driven since; None: nothing was heard.
+        """
+        return None if self._T_odom_driven is None else self._T_odom_driven @ self._driven
 
     def forget(self) -> None:
         """Begin anew, where the virtual robot is: the robot's clock was set."""
@@ -182,7 +184,8 @@ class MirroredRobot:
         now_ns, world, base = self.node.now_ns, self._world, self.stack.handle.base
         virtual = world.pose(base).to_pose2()
         self.follower.note(now_ns, virtual)
-        self.divergence.place(now_ns, virtual, self.follower.correction.inverse() @ virtual)
+        self._driven = self.follower.correction.inverse() @ virtual
+        self.divergence.place(now_ns, virtual, self._driven)
         while self._pending and self._pending[0][0] <= now_ns:
             self._measure(*self._pending.popleft())
         elapsed_s = 0.0 if self._stepped_ns is None else (now_ns - self._stepped_ns) * 1e-9
