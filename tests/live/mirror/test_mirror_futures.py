@@ -192,6 +192,13 @@ def test_where_no_physical_robot_is_heard_it_is_a_model_s_future(tmp_path: Path)
         assert told.outcomes[0].path[-1][1:3] == pytest.approx(_GOAL[:2], abs=0.3)
 
 
+def test_what_is_commanded_through_a_guard_drives_the_virtual_robot(tmp_path: Path) -> None:
+    with beside(tmp_path, guard="guard") as both:
+        both.until(1.5)
+        assert not both.source.commands, "no guard is there to pass anything on"
+        assert both.answer(n=1, horizon=20.0).succeeded == 1
+
+
 def test_a_mirror_that_only_localises_navigates_in_its_futures(tmp_path: Path) -> None:
     with beside(tmp_path, autonomy="localisation") as both:
         both.until(1.0)

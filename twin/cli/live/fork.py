@@ -50,7 +50,7 @@ def fork(
     *,
     joining: Joining,
 ) -> None:
-    """Run futures of a run that goes on, and tell how they end.
+    """Run futures of a run, or of a mirror, that goes on, and tell how they end.
 
     Each is a fork of the run, as it is at this moment, that goes on faster than real time. The first has the
     noise that the run will have, each of the others its own. The run goes on as if nothing had happened.
