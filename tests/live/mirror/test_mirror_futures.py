@@ -11,7 +11,7 @@ import pytest
 from tests.live.futures.conftest import listening
 from tests.live.mirror.beside import Beside
 from twin.bridge import live
-from twin.bridge.msgs import Odometry, Twist, ns
+from twin.bridge.msgs import Odometry, String, Twist, ns
 from twin.bridge.msgs import Path as PathMsg
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import Trigger
@@ -158,7 +158,13 @@ def test_nobody_hears_them_and_the_node_answers(tmp_path: Path, endpoint: str) -
                 observer.create_subscription(Odometry, topic, on_odometry, 1000)
             observer.create_subscription(PathMsg, "/futures/path_1", paths.append, LATCHED)
 
+            state = observer.create_publisher(String, "/mission/state", LATCHED)
+            arrived: list[str] = []
+            both.run.run.bus.arrival_taps.append(lambda arrival: arrived.append(arrival.receiver.name))
+
             def listen() -> None:
+                if "/mission/state" not in arrived:  # what others say is drawn, too
+                    state.publish(String(data="elsewhere"))
                 here.spin_once(0.0)
 
             both.run.between_ticks.append(listen)
@@ -171,6 +177,7 @@ def test_nobody_hears_them_and_the_node_answers(tmp_path: Path, endpoint: str) -
             assert response.success, response.message
             assert here.spin(lambda: len(commands) + missed >= len(told) and bool(paths), timeout_s=60.0)
             both.run.between_ticks.remove(listen)
+        assert "/mission/state" in arrived
         assert commands[-100:] == [message for _, message in told[-100:]]
         assert len(commands) + missed == len(told)
         assert max(ahead) <= 0
