@@ -90,3 +90,18 @@ def test_velocities_integrated_as_white_noise_are_as_unsure_as_the_pose() -> Non
     assert odometry.covariance[0] == pytest.approx(place)
     assert odometry.covariance[8] == pytest.approx(turn)
     assert 0.0 < at_rest[0] < 1e-4
+
+
+def test_placed_elsewhere_it_goes_on_as_if_it_had_begun_there() -> None:
+    odometry, pose = drive(0.4, -0.7, 1.0), Pose2(3.0, -2.0, 2.0)
+    before = odometry.pose
+    covariance = np.array(odometry.covariance).reshape(3, 3)
+    odometry.place(pose @ before)
+    turned = np.array(odometry.covariance).reshape(3, 3)
+    rotation = np.eye(3)
+    rotation[:2, :2] = [[math.cos(2.0), -math.sin(2.0)], [math.sin(2.0), math.cos(2.0)]]
+    assert turned == pytest.approx(rotation @ covariance @ rotation.T)
+    last = (0.4 + 0.7 * 0.15) / 0.05, (0.4 - 0.7 * 0.15) / 0.05
+    odometry.update(last[0] + 2.0, last[1] + 2.0, 0.2)
+    assert odometry.pose == pytest.approx(pose @ before @ Pose2(0.1, 0.0, 0.0))
+    assert odometry.velocity == pytest.approx((0.5, 0.0))

@@ -124,6 +124,21 @@ class Odometry:
         self.velocity = (distance / dt, angle / dt)
         return self.pose
 
+    def place(self, pose: Pose2) -> None:
+        """Go on from another pose: what was driven so far is seen from another `odom`."""
+        turn = pose.yaw - self.pose.yaw
+        c, s = math.cos(turn), math.sin(turn)
+        xx, xy, yy, xt, yt, tt = self._variances
+        self._variances = (
+            c * c * xx - 2.0 * c * s * xy + s * s * yy,
+            c * s * (xx - yy) + (c * c - s * s) * xy,
+            s * s * xx + 2.0 * c * s * xy + c * c * yy,
+            c * xt - s * yt,
+            s * xt + c * yt,
+            tt,
+        )
+        self.pose = pose
+
     def _grow_covariance(
         self, distance: float, angle: float, heading: float, dt: float, *, gyro: bool
     ) -> None:

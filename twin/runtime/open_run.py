@@ -33,7 +33,7 @@ from twin.savings import ALL, Savings, uncollected
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import Provenance, cpu_class, versions
 from twin.scenario.schema import Scenario
-from twin.scenario.verdict import Verdict
+from twin.scenario.verdict import Label, Verdict
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -135,6 +135,10 @@ class OpenRun:
         self._comparable = comparable
         self.between_ticks: list[Callable[[], None]] = []
         """Called after each tick of `advance`."""
+        self.when_alone: list[Callable[[], None]] = []
+        """Called in a fork that goes on alone, before its first tick."""
+        self.label: Label = "model"
+        """What it may call itself; a mirror says what."""
         self._thought = False
         """Whether a tick is under way, at an agent's place."""
         bag_tap = None
@@ -304,6 +308,8 @@ class OpenRun:
         self._sink = self._pace = self._out = None
         self.run.wait = lambda: None
         self.between_ticks = []
+        for each in self.when_alone:
+            each()
 
     def finish(self) -> Verdict:
         """Judge the run as it stands, write what it leaves, and close it.

@@ -17,6 +17,9 @@ from twin.scenario.faults import FaultReport
 VERDICT = "verdict.json"
 """The file of a run's folder that says how it ended; the last that is written."""
 
+Label = Literal["model", "shadow", "twin"]
+"""What virtual robots are to physical ones."""
+
 EXIT_CODES = {"pass": 0, "fail": 1, "error": 2, "inconclusive": 3}
 """Of commands; a single run is never inconclusive."""
 
@@ -43,8 +46,8 @@ class Verdict:
     """What users brought, by name: a package and its version, or the hash of a file."""
     cpu: str = ""
     """The class of CPU within which digests can be compared."""
-    label: Literal["model", "shadow", "twin"] = "model"
-    """What the robots are to physical ones, at the end: without one they are a model."""
+    label: Label = "model"
+    """What the robots are at the end; without physical ones they are a model."""
     test: str = ""
     """Name of the test that the run was, such as `warehouse[seed=3]`; empty if it was none."""
     command: str = ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xxhash
 
@@ -62,6 +62,16 @@ class ClientGoal:
         return self
 
 
+class _Sent(NamedTuple):
+    """A goal that has not ended."""
+
+    goal: ClientGoal
+    message: Any
+    time_ns: int
+    """When it was sent [ns]."""
+    feedback: Callable[[Any], None] | None
+
+
 class ActionClient:
     """Sends goals to an action server."""
 
@@ -74,14 +84,14 @@ class ActionClient:
         self._type = action_type
         self.name = node.resolve_name(name)
         """Absolute name of the action."""
-        self._goals: dict[bytes, tuple[ClientGoal, Callable[[Any], None] | None]] = {}
+        self._goals: dict[bytes, _Sent] = {}
         self._count = 0
         self.node = node
         """Whose client it is."""
         self._destroyed = False
-        node.action_clients += 1
+        node.action_clients.append(self)
         # Not the gid: that depends on what other nodes have created before.
-        self._seed = f"{node.bus.session_id}{node.fully_qualified_name}#{node.action_clients}".encode()
+        self._seed = f"{node.bus.session_id}{node.fully_qualified_name}#{len(node.action_clients)}".encode()
         base = f"{self.name}/_action"
         self._send = node.create_client(action_type.SendGoal, f"{base}/send_goal")
         self._cancel = node.create_client(CancelGoal, f"{base}/cancel_goal")
@@ -122,7 +132,7 @@ class ActionClient:
         # Unique like a random UUID, and the same in the same run.
         goal_id = xxhash.xxh3_128_digest(self._seed + self._count.to_bytes(8, "little"))
         client_goal = ClientGoal(self, goal_id)
-        self._goals[goal_id] = (client_goal, feedback_callback)
+        self._goals[goal_id] = _Sent(client_goal, goal, self.node.now_ns, feedback_callback)
         hold = self.node.bus.hold_goal
         client_goal.held = hold is not None and hold(self, client_goal, goal)
         if not client_goal.held:
@@ -134,6 +144,16 @@ class ActionClient:
         client_goal.held = False
         request = self._type.SendGoal.Request(uuid_msg(client_goal.goal_id), goal)
         self._send.call_async(request).add_done_callback(lambda f: self._on_accepted(client_goal, f))
+
+    def post_again(self, revised: Callable[[Any, int], Any]) -> None:
+        """Send the goals that have not ended to the server that has taken the place of theirs.
+
+        Args:
+            revised: Returns what is sent instead of a goal's message of so long ago [ns].
+        """
+        for sent in tuple(self._goals.values()):
+            if not sent.goal.held:
+                self.post(sent.goal, revised(sent.message, self.node.now_ns - sent.time_ns))
 
     def answer(self, goal: ClientGoal, status: int, result: Any = None) -> None:
         """End a goal that was held back instead of the server, which never hears of it.
@@ -217,16 +237,16 @@ class ActionClient:
 
     def _wants_feedback(self, payload: bytes) -> bool:
         """Whether somebody waits for it: every client hears that of all clients' goals."""
-        _, callback = self._goals.get(payload[_GOAL_ID], (None, None))
-        return callback is not None
+        sent = self._goals.get(payload[_GOAL_ID])
+        return sent is not None and sent.feedback is not None
 
     def _on_feedback(self, message: Any) -> None:
-        _, callback = self._goals.get(bytes(message.goal_id.uuid), (None, None))
-        if callback is not None:
-            callback(message.feedback)
+        sent = self._goals.get(bytes(message.goal_id.uuid))
+        if sent is not None and sent.feedback is not None:
+            sent.feedback(message.feedback)
 
     def _on_status(self, message: GoalStatusArray) -> None:
         for entry in message.status_list:
-            goal, _ = self._goals.get(bytes(entry.goal_info.goal_id.uuid), (None, None))
-            if goal is not None and entry.status in ACTIVE:  # the end comes with the result
-                goal.status = int(entry.status)
+            sent = self._goals.get(bytes(entry.goal_info.goal_id.uuid))
+            if sent is not None and entry.status in ACTIVE:  # the end comes with the result
+                sent.goal.status = int(entry.status)

@@ -25,6 +25,7 @@ from twin.errors import BridgeError
 from twin.periods import Period, period_of
 
 if TYPE_CHECKING:
+    from twin.bridge.actions.client import ActionClient
     from twin.bridge.bus import Bus
 
 M = TypeVar("M")
@@ -69,8 +70,8 @@ class Node(NodeParameters, NodeGraph):
         self.token = NodeToken(bus.domain_id, bus.session_id, self.number, self.namespace, self.name)
         self._names = names.Resolver(self.namespace, self.name, remappings, self.options.arguments.remappings)
         self._liveliness: Any = bus.wire.declare_token(str(self.token))
-        self.action_clients = 0
-        """How many there have been."""
+        self.action_clients: list[ActionClient] = []
+        """All that there have been."""
         self._endpoints: list[OwnedEndpoint] = []
         self._timers: list[Timer] = []
         self._executions: list[Execution] = []

@@ -15,6 +15,7 @@ import zenoh.ext
 from twin.bridge import types
 from twin.bridge.cdr.codec import Codec, codec
 from twin.bridge.qos import INFINITE_NS, QoS
+from twin.bridge.topics.in_process import Listeners
 from twin.bridge.topics.link import Carried
 from twin.bridge.topics.sample import ReceivedSample as ReceivedSample
 from twin.bridge.topics.sample import Sample as Sample
@@ -278,8 +279,12 @@ class Subscription(Endpoint, Generic[M]):
         self._listeners = bus.in_process.listeners(self.key)
         self._listeners.receivers.append(self)
         self.announce()
-        if qos.durability == "transient_local":
-            for sample in self._listeners.retained(self._most):
+        self.catch_up(self._listeners)
+
+    def catch_up(self, listeners: Listeners) -> None:
+        """Hear what is kept for those who come later, if that is asked for."""
+        if self.is_latched:
+            for sample in listeners.retained(self._most):
                 self.enqueue(sample, False)
 
     @property

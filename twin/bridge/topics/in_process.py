@@ -66,6 +66,14 @@ class InProcess:
         """Return who hears a key, now and later."""
         return self._listeners.setdefault(key, Listeners(self))
 
+    def join(self, key: str, other: str) -> None:
+        """Let two keys be one; all who hear them are known here."""
+        mine, theirs = self.listeners(key), self.listeners(other)
+        # The same lists: several keys may be joined with one.
+        theirs.receivers.extend(mine.receivers)
+        theirs.latched.extend(mine.latched)
+        mine.receivers, mine.latched = theirs.receivers, theirs.latched
+
     @property
     def keys(self) -> tuple[Listeners, ...]:
         """Who hears each key."""

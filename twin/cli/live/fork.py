@@ -50,7 +50,7 @@ def fork(
     *,
     joining: Joining,
 ) -> None:
-    """Run futures of a run that goes on, and tell how they end.
+    """Run futures of a run, or of a mirror, that goes on, and tell how they end.
 
     Each is a fork of the run, as it is at this moment, that goes on faster than real time. The first has the
     noise that the run will have, each of the others its own. The run goes on as if nothing had happened.
@@ -128,8 +128,8 @@ def _find(process: LiveBus) -> None:
         find_node(process, NODE, hidden=False, timeout_s=_WAIT_S)
     except BridgeError:
         raise SimulationError(
-            "nobody there tells futures; who does is `twin run` with --listen or --connect, "
-            "without --wait-for and --workers"
+            "nobody there tells futures; who does is `twin mirror`, and `twin run` with --listen or "
+            "--connect, without --wait-for and --workers"
         ) from None
 
 
@@ -171,7 +171,8 @@ def _report(answer: Answer) -> list[str]:
             f"arrival {min(arrivals):.2f} to {max(arrivals):.2f} s from now, median {median(arrivals):.2f} s"
         )
     lines.append(
-        f"from t = {answer.at_s:.2f} s; {answer.cpu_s:.1f} s of CPU in {answer.wall_s:.1f} s; "
+        f"from t = {answer.at_s:.2f} s of a {answer.label}; "
+        f"{answer.cpu_s:.1f} s of CPU in {answer.wall_s:.1f} s; "
         f"the run stood still for {answer.stall_s * 1e3:.0f} ms"
     )
     return lines

@@ -78,6 +78,7 @@ def mirror(
     from twin.bridge.programs.console_log import show_warnings
     from twin.bridge.wire.interrupts import noted_signals
     from twin.cli.run.options import parse_overrides
+    from twin.live.futures.node import FuturesNode
     from twin.live.mirror.mirror import Mirror
     from twin.live.mirror.status_text import status_text
     from twin.scenario.schema import load
@@ -91,6 +92,8 @@ def mirror(
         noted_signals() as received,
         _shown(robots) as show,
     ):
+        if bag is None:
+            FuturesNode(robots.run)
         run = robots.run.run
         end_ns = None if duration is None else duration * 1e9
 

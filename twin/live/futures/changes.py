@@ -44,11 +44,21 @@ def change(run: Run, words: tuple[str, ...]) -> None:
 def send(run: Run, stack: RobotStack, goal: Pose2) -> ClientGoal:
     """Send a robot somewhere, instead of what its missions want.
 
+    A mirror that only localises it begins to navigate here, as its scenario says.
+
     Raises:
-        SimulationError: It does not navigate.
+        SimulationError: It does not navigate, or is not localised here.
     """
-    if stack.navigator is None:
+    if stack.context.config.navigation is None:
         raise SimulationError(f"--goal: robot '{stack.name}' does not navigate; it has no `navigation`")
+    if stack.context.layout.autonomy == "none":
+        raise SimulationError(
+            f"--goal: robot '{stack.name}' is not localised here; start the mirror with --autonomy all, "
+            "or localisation"
+        )
+    if stack.navigator is None:
+        stack.navigate()
+    assert stack.navigator is not None
     clients = [e for decider in run.parts.deciders for e in decider.endpoints if isinstance(e, Client)]
     cancels = {client.name: None for client in clients if client.name.endswith("/_action/cancel_goal")}
     for decider in run.parts.deciders:

@@ -16,6 +16,7 @@ from twin.live.futures.outcome import Outcome
 from twin.live.futures.served import serve, watched
 from twin.live.futures.what_if import WhatIf
 from twin.runtime.open_run import OpenRun
+from twin.scenario.verdict import Label
 
 _CHUNK = 1 << 16
 _SLACK_S = 30.0
@@ -30,6 +31,8 @@ class Answer:
     asked: WhatIf
     at_s: float
     """Simulated time of the fork [s]."""
+    label: Label
+    """What the robots were at that moment: without physical ones a model."""
     awaited: str
     """What they wait for: `the goal under way`; empty: for nothing."""
     outcomes: tuple[Outcome, ...]
@@ -56,7 +59,7 @@ class Answer:
         outcomes = [outcome.to_dict() for outcome in self.outcomes]
         own = {name: getattr(self, name) for name in ("at_s", "cpu_s", "wall_s", "stall_s")}
         counts = {"succeeded": self.succeeded, "known": self.known}
-        told = {"asked": self.asked.to_dict(), "awaited": self.awaited}
+        told = {"asked": self.asked.to_dict(), "awaited": self.awaited, "label": self.label}
         return json.dumps({**told, **own, **counts, "outcomes": outcomes})
 
     @classmethod
@@ -66,7 +69,8 @@ class Answer:
         own = {name: float(values[name]) for name in ("at_s", "cpu_s", "wall_s", "stall_s")}
         outcomes = tuple(map(Outcome.from_dict, values["outcomes"]))
         asked, awaited = WhatIf.from_dict(values["asked"]), str(values["awaited"])
-        return cls(asked=asked, awaited=awaited, outcomes=outcomes, **own)
+        label: Label = values["label"]
+        return cls(asked=asked, awaited=awaited, label=label, outcomes=outcomes, **own)
 
 
 class Futures:
@@ -101,7 +105,7 @@ class Futures:
         limit = _LIMIT_S + _LIMIT_FACTOR * asked.horizon if time_limit_s is None else time_limit_s
         jobs = jobs or len(os.sched_getaffinity(0))
         self.asked = asked
-        self._at_s = run.run.world.time_ns * 1e-9
+        self._at_s, self._label = run.run.world.time_ns * 1e-9, run.label
         self._outcomes: dict[int, Outcome] = {}
         self._heard = b""
         self._told: dict[str, Any] = {}
@@ -164,6 +168,7 @@ class Futures:
         self._told["answer"] = Answer(
             asked=self.asked,
             at_s=self._at_s,
+            label=self._label,
             awaited=self._told.get("awaited", ""),
             outcomes=tuple(self._outcomes[number] for number in sorted(self._outcomes)),
             cpu_s=self._told.get("cpu_s", 0.0),

@@ -48,6 +48,8 @@ class FuturesNode:
         self._run, self._inputs = run, inputs
         self._asked: tuple[WhatIf, Respond] | None = None
         self._futures: Futures | None = None
+        self._at_ns = 0
+        """When they began, by the clock of the nodes."""
         self._snapshots: list[Respond] = []
         """Who waits for one."""
         self._ghosts: list[RawPublisher] = []
@@ -92,6 +94,7 @@ class FuturesNode:
         try:
             if self._futures is None:
                 self._futures = Futures(self._run, asked, politely=True)
+                self._at_ns = self.node.now_ns
             answer = self._futures.poll()
             if answer is None:
                 return
@@ -109,6 +112,9 @@ class FuturesNode:
 
     def _snapshot(self) -> Any:
         try:
+            if not self._run.run.parts.clock.is_simulated:
+                why = "a mirror has no snapshot: what came into it came by other clocks, and comes so once"
+                raise SimulationError(why)
             if self._inputs is None:
                 raise SimulationError("the run keeps no inputs; start it with `twin run … --keep-inputs`")
             return Trigger.Response(True, Snapshot.of(self._run, self._inputs).to_json())
@@ -117,7 +123,7 @@ class FuturesNode:
 
     def _show(self, answer: Answer) -> None:
         """Draw the paths, on topics too; those of the answer before go."""
-        at_ns = round(answer.at_s * 1e9)
+        at_ns = self._at_ns
         paths: Sequence[Outcome | None] = [
             *answer.outcomes,
             *[None] * (len(self._ghosts) - len(answer.outcomes)),

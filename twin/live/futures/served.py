@@ -66,6 +66,11 @@ def serve(run: OpenRun, asked: WhatIf, jobs: int, time_limit_s: float, politely:
         stack = watched(run, asked.robot)
         change(run.run, asked.set)
         goal = asked.goal_pose
+        if goal is None and stack.context.layout.autonomy != "all":
+            raise SimulationError(
+                f"what commands robot '{stack.name}' is not here, so nothing tells what it will do: "
+                "ask with --goal X,Y,YAW, or start the mirror with --autonomy all"
+            )
         awaited = Awaited(run.run, stack, None if goal is None else send(run.run, stack, goal))
     except Exception as error:
         _say(pipe, {"refused": _sentence(error)})

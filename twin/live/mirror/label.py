@@ -7,9 +7,9 @@ automatic from the physical to the virtual one a shadow's, automatic both ways a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
-Label = Literal["model", "shadow", "twin"]
+from twin.scenario.verdict import Label as Label
+
 LABELS: tuple[Label, ...] = ("model", "shadow", "twin")
 """Each asks for more than those before it."""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal, Self
 
 from twin.bridge.msgs import DiagnosticArray, String
+from twin.bridge.node import Node
 from twin.bridge.qos import LATCHED
 from twin.live.mirror.followed_clock import FollowedClock
 from twin.live.mirror.label import Label
@@ -16,6 +17,7 @@ from twin.live.mirror.shown import Shown
 from twin.live.mirror.source import Source
 from twin.live.mirror.status import Status, to_array, worst
 from twin.live.mirror.status_text import status_text
+from twin.live.mirror.taking_over import take_over
 from twin.live.mirror.verdict import mirror_verdict
 from twin.runtime.open_run import OpenRun
 from twin.runtime.stacks.context import Layout
@@ -84,6 +86,8 @@ class Mirror:
             )
             ending.callback(self.run.close)
             run = self.run.run
+            self._drivers = self._in_namespace()
+            self.run.when_alone.append(self._take_over)
             shown.begin(run.world)
             run.bus.arrival_taps.append(shown.on_arrival)
             stacks = run.parts.stacks.values()
@@ -129,6 +133,16 @@ class Mirror:
         """Leave the graph. Harmless when repeated."""
         self._ending.close()
 
+    def _in_namespace(self) -> tuple[Node, ...]:
+        """Return the nodes in the namespace of virtual robots."""
+        nodes = self.run.run.bus.nodes
+        return tuple(node for node in nodes if f"{node.namespace}/".startswith(f"{NAMESPACE}/"))
+
+    def _take_over(self) -> None:
+        """Be, in a fork, a run of virtual robots: with their own sensors, from where they are."""
+        own = [node for node in self._in_namespace() if node not in self._drivers]
+        take_over(self.run.run.bus, self.robots, own, self._drivers, NAMESPACE)
+
     def _after_tick(self) -> bool:
         event = self.source.after_tick()
         if event is not None:
@@ -148,5 +162,5 @@ class Mirror:
         label = worst(statuses)
         self._seconds[label] = self._seconds.get(label, 0.0) + _STATUS_NS * 1e-9
         if label != self._told:
-            self._told = label
+            self._told = self.run.label = label
             self._label.publish(String(data=label))

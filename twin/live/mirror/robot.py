@@ -93,7 +93,12 @@ class MirroredRobot:
         self._is_localised_here = (
             context.layout.autonomy != "none" and localisation is not None and localisation.type != "none"
         )
-        self._pending: deque[tuple[int, Pose2]] = deque(maxlen=_PENDING)
+        self._pending: deque[tuple[int, Pose2, Pose2 | None]] = deque(maxlen=_PENDING)
+        """Time, pose in the odometry's frame, and in the map if the robot is localised."""
+        self._T_odom_driven: Pose2 | None = None
+        """From where the virtual robot would be without corrections, to the physical one's odometry."""
+        self._driven = Pose2(0.0, 0.0, 0.0)
+        """Where it would be."""
         self._stuck: dict[str, int] = {}
         """For how many ticks the virtual robot has touched what, while it was left behind."""
         self._invalid_ns: int | None = None
@@ -154,6 +159,14 @@ class MirroredRobot:
             told=dict(self.told.words),
         )
 
+    @property
+    def odometry(self) -> Pose2 | None:
+        """What the physical odometry tells of the start of this tick, when drives read their encoders, too.
+
+        It is what was heard last, and what the virtual robot has driven since; None: nothing was heard.
+        """
+        return None if self._T_odom_driven is None else self._T_odom_driven @ self._driven
+
     def forget(self) -> None:
         """Begin anew, where the virtual robot is: the robot's clock was set."""
         self.follower.forget()
@@ -171,7 +184,8 @@ class MirroredRobot:
         now_ns, world, base = self.node.now_ns, self._world, self.stack.handle.base
         virtual = world.pose(base).to_pose2()
         self.follower.note(now_ns, virtual)
-        self.divergence.place(now_ns, virtual, self.follower.correction.inverse() @ virtual)
+        self._driven = self.follower.correction.inverse() @ virtual
+        self.divergence.place(now_ns, virtual, self._driven)
         while self._pending and self._pending[0][0] <= now_ns:
             self._measure(*self._pending.popleft())
         elapsed_s = 0.0 if self._stepped_ns is None else (now_ns - self._stepped_ns) * 1e-9
@@ -225,7 +239,13 @@ class MirroredRobot:
             if self._stuck[contact.body2] >= _STUCK_TICKS:
                 self._world.alterations.let_through(solid for _, solid in contact.geoms)
 
-    def _measure(self, stamp_ns: int, physical: Pose2) -> None:
+    def _measure(self, stamp_ns: int, odometry: Pose2, physical: Pose2 | None) -> None:
+        follower = self.follower
+        virtual = follower.virtual_at(stamp_ns)
+        if virtual is not None:
+            self._T_odom_driven = odometry @ virtual.inverse() @ follower.correction
+        if physical is None:
+            return
         difference = self.follower.measured(stamp_ns, physical)
         if difference is None:
             return
@@ -251,8 +271,7 @@ class MirroredRobot:
             self._latest_ns = stamp_ns
             self.told.late((self.node.now_ns - stamp_ns) * 1e-9)
             T_world_odom = self._T_world_odom()
-            if T_world_odom is not None:
-                self._pending.append((stamp_ns, T_world_odom @ pose))
+            self._pending.append((stamp_ns, pose, None if T_world_odom is None else T_world_odom @ pose))
 
     def _T_world_odom(self) -> Pose2 | None:
         stack = self.stack

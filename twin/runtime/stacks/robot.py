@@ -22,6 +22,7 @@ from twin.runtime.stacks.localisation import build_localisation
 
 if TYPE_CHECKING:
     from twin.nodes.navigation.bt_navigator import BtNavigatorNode
+    from twin.nodes.navigation.localisation.ekf import EkfNode
     from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig
     from twin.nodes.navigation.mapping.slam_toolbox import SlamToolboxNode
 
@@ -50,11 +51,11 @@ class RobotStack:
 
             fusion, told = odometry_filter(context, self.frames)
         self.drive = self._build_drive(description, enable_odom_tf=fusion is None or not fusion.publish_tf)
-        fused = None
+        self.filter: EkfNode | None = None
         if fusion is not None:
-            fused = EkfNode(bus, fusion, namespace=namespace)
+            self.filter = EkfNode(bus, fusion, namespace=namespace)
             for sentence in told:
-                fused.node.get_logger().warn(sentence)
+                self.filter.node.get_logger().warn(sentence)
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=context.namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)
@@ -64,8 +65,15 @@ class RobotStack:
         self.slam: SlamToolboxNode | None = None
         self._build_autonomy()
         self._build_arm(description)
-        if fused is not None:
-            warn_of_unpublished_sources(context, fused)
+        if self.filter is not None:
+            warn_of_unpublished_sources(context, self.filter)
+
+    def place_odometry(self, pose: Pose2) -> None:
+        """Let odometry, and the filter of it, go on from a pose in the odometry frame."""
+        if self.drive is not None:
+            self.drive.odometry.place(pose)
+        if self.filter is not None:
+            self.filter.place(pose)
 
     def standing(self, pose: Pose2) -> Pose3:
         """Return the pose of the base when it stands on the floor at `pose`."""
@@ -107,9 +115,7 @@ class RobotStack:
         if context.layout.autonomy == "localisation":
             return
         if context.config.navigation is not None:
-            from twin.runtime.stacks.navigation import build_navigation
-
-            self.navigator = build_navigation(context, context.config.navigation, pose, self.footprint)
+            self.navigate()
         elif self.drive is not None:
             from twin.nodes.navigation.behavior_server import BehaviorServerNode
 
@@ -121,6 +127,15 @@ class RobotStack:
                 period_ns=context.control_period_ns,
                 namespace=context.namespace,
             )
+
+    def navigate(self) -> None:
+        """Build the nodes of navigation, which `config` asks for."""
+        from twin.runtime.stacks.navigation import build_navigation
+
+        context, config = self.context, self.context.config.navigation
+        assert config is not None
+        context.bus.group = context.namespace
+        self.navigator = build_navigation(context, config, self.robot_pose, self.footprint)
 
     def _build_arm(self, description: RobotDescription) -> None:
         context, hardware = self.context, self.handle.hardware

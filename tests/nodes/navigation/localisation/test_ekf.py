@@ -126,6 +126,18 @@ def test_set_pose_starts_again_and_refuses_what_is_not_finite(bench: Bench) -> N
         assert robot.filtered[-1].pose.pose.position.x == pytest.approx(3.0, abs=0.01)
 
 
+def test_placed_elsewhere_it_goes_on_as_fast_and_as_sure(bench: Bench) -> None:
+    robot = Driven(bench)
+    robot.go(2.0, 0.3, 0.0)
+    before = robot.filtered[-1].pose.covariance.reshape(6, 6)
+    robot.ekf.place(Pose2(5.0, 1.0, math.pi / 2.0))
+    robot.go(1.0, 0.3, 0.0)
+    after, filtered = robot.filtered[-1].pose.covariance.reshape(6, 6), robot.filtered[-1].pose.pose
+    assert (filtered.position.x, filtered.position.y) == pytest.approx((5.0, 1.3), abs=0.02)
+    assert robot.filtered[-1].twist.twist.linear.x == pytest.approx(0.3, abs=0.01)
+    assert before[0, 0] < after[1, 1] < 3.0 * before[0, 0]
+
+
 def test_an_imu_that_returns_nan_leaves_the_wheels(bench: Bench) -> None:
     robot = Driven(bench)
     robot.go(1.0, 0.0, 0.0)
