@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from twin.bridge.bags.reader import BagReader
 from twin.bridge.cdr.codec import codec
 from twin.bridge.topics import Publisher
 from twin.errors import BridgeError, RecordingError
-from twin.live.mirror.source import Source
+from twin.live.mirror.source import ClockChange, ClockReading, Source
 
 if TYPE_CHECKING:
     from twin.live.mirror.followed_clock import FollowedClock
@@ -57,15 +58,10 @@ class BagSource(Source):
         """When the first message was published."""
         return self._start_ns if self._next is None else self._next.publish_ns
 
-    @property
-    def clock_bound_s(self) -> float | None:
+    def reading(self, robot: str) -> ClockReading:
         """Nothing bounds what the fastest message took, unless a mirror was there."""
-        return 0.0 if self._has_own else None
-
-    @property
-    def clock_offset_s(self) -> float | None:
-        """As the fastest message tells [s]: too little by what it took."""
-        return self._ahead[0][1] * 1e-9 if self._ahead else None
+        offset_s = self._ahead[0][1] * 1e-9 if self._ahead else None
+        return ClockReading(offset_s=offset_s, bound_s=0.0 if self._has_own else None)
 
     @property
     def over(self) -> bool:
@@ -78,16 +74,16 @@ class BagSource(Source):
         self._node = run.run.bus.create_node("rosbag2_player")
         self._play()
 
-    def after_tick(self) -> tuple[str, str] | None:
+    def after_tick(self) -> Sequence[ClockChange]:
         """Play what was received up to now."""
         self._play()
         if not self._ahead:
-            return None
+            return ()
         log_ns = self._start_ns + self._run.run.world.time_ns
-        set_by = self._clock.follow(log_ns + self._ahead[0][1], 0) * 1e-9
-        if set_by >= 0.0 and set_by < _LARGEST_STEP_NS * 1e-9:
-            return None
-        return "clock", f"the robot's clock was set by {set_by:+.3f} s"
+        set_by_ns = self._clock.follow(log_ns + self._ahead[0][1], 0)
+        if 0 <= set_by_ns < _LARGEST_STEP_NS:
+            return ()
+        return (ClockChange(what="clock", set_by_ns=set_by_ns),)
 
     def close(self) -> None:
         """Close the bag."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from twin.bridge.graph import Graph
 from twin.live.mirror.exchanges import ClockExchanges
-from twin.live.mirror.source import Source
+from twin.live.mirror.source import ClockChange, ClockReading, Source
 from twin.runtime.pacing import Pace
 
 if TYPE_CHECKING:
@@ -39,18 +40,14 @@ class LiveSource(Source):
         """Our own time of day [ns since 1970]."""
         return time.time_ns()
 
-    @property
-    def clock_bound_s(self) -> float | None:
-        """Half of the shortest round trip, about [s]."""
+    def reading(self, robot: str) -> ClockReading:
+        """As of the latest answer; the bound is half of the shortest round trip, about."""
         estimate = None if self.exchanges is None else self.exchanges.estimate
-        return None if estimate is None else estimate.bound_s
-
-    @property
-    def clock_offset_s(self) -> float | None:
-        """As of the latest answer [s]."""
         now_ns = time.perf_counter_ns()
         other_ns = None if self.exchanges is None else self.exchanges.other_ns(now_ns)
-        return None if other_ns is None else (other_ns - time.time_ns()) * 1e-9
+        if estimate is None or other_ns is None:
+            return ClockReading()
+        return ClockReading(offset_s=(other_ns - time.time_ns()) * 1e-9, bound_s=estimate.bound_s)
 
     def begin(self, run: OpenRun, clock: FollowedClock) -> None:
         """Wait a moment for the first answers, so that the first stamps are those of the robot's clock."""
@@ -71,21 +68,20 @@ class LiveSource(Source):
         assert self.pace is not None
         self.pace.start()
 
-    def after_tick(self) -> tuple[str, str] | None:
+    def after_tick(self) -> Sequence[ClockChange]:
         """Ask for the time, and follow the answers."""
         assert self.exchanges is not None
         if not self.exchanges.update():
-            return None
+            return ()
         # What is due now may come later: a machine that stutters is no reason to set clocks.
         due_ns = self._run.due_ns
         assert due_ns is not None
-        set_by = self._follow(due_ns) * 1e-9
+        set_by_ns = self._follow(due_ns)
         steps, self._steps = self._steps, self.exchanges.offset.steps
-        if not set_by:
-            return None
-        if self._steps > steps or set_by < 0.0:
-            return "clock", f"the robot's clock was set by {set_by:+.3f} s"
-        return "pace", f"this computer was too slow: {set_by:.3f} s are lost"
+        if not set_by_ns:
+            return ()
+        is_set = self._steps > steps or set_by_ns < 0
+        return (ClockChange(what="clock" if is_set else "pace", set_by_ns=set_by_ns),)
 
     def close(self) -> None:
         """Watch the graph no more."""
