@@ -11,6 +11,7 @@ from twin.bridge.node import Node
 from twin.bridge.topics import Publisher, Sample, Subscription
 from twin.bridge.wire.session import SessionConfig
 from twin.live.mirror.followed_clock import FollowedClock
+from twin.live.mirror.robot_clocks import RobotClocks
 from twin.live.mirror.source import ClockChange, ClockReading, Source
 from twin.live.perturbations import perturbed
 from twin.live.plant import Plant
@@ -42,6 +43,8 @@ class Beside(Source):
         self._nodes: dict[int, Node] = {}
         """Of the cable's end at each plant."""
         self._publishers: dict[tuple[int, str], Publisher[Any]] = {}
+        self._only: dict[int, tuple[str, ...]] = {}
+        """Which robots of a plant are there; empty: all."""
         self._queue: list[tuple[int, int, Callable[[], None]]] = []
         self._count = 0
 
@@ -55,6 +58,10 @@ class Beside(Source):
     def begin(self, run: OpenRun, clock: FollowedClock) -> None:
         self._run, self._clock = run, clock
         self._node = run.run.bus.create_node("cable")
+        run.run.bus.forget(self._node)  # it is no part of the mirror: what it says is not said from here
+        stacks = run.run.parts.stacks
+        spaces = {name: stack.context.namespace for name, stack in stacks.items()}
+        self._clocks = RobotClocks(clock, spaces) if len(stacks) > 1 else None
         run.run.bus.tap(self._down)
         plants, self.plants = self.plants, []
         for each in plants:
@@ -68,11 +75,19 @@ class Beside(Source):
             heapq.heappop(self._queue)[2]()
         if not self.plants:
             return ()
-        set_by_ns = self._clock.follow(self.plants[0].clock.now_ns, 0)
-        return (ClockChange(what="clock", set_by_ns=set_by_ns),) if set_by_ns else ()
+        if self._clocks is None:
+            set_by_ns = self._clock.follow(self.plants[0].clock.now_ns, 0)
+            return (ClockChange(what="clock", set_by_ns=set_by_ns),) if set_by_ns else ()
+        self._clock.follow(START_NS + now_ns, 0)
+        changes: list[ClockChange] = []
+        for robots in self.plants:
+            for name in self._only[id(robots)] or robots.names:
+                changes += self._clocks.follow(name, now_ns, robots.clock.now_ns, round(BOUND_S * 1e9))
+        return changes
 
-    def start(self, robots: Plant) -> None:
-        """Connect robots, from now on."""
+    def start(self, robots: Plant, only: Sequence[str] = ()) -> None:
+        """Connect robots, from now on; of several only some are heard, if they are named."""
+        self._only[id(robots)] = tuple(only)
         bus = robots.run.run.bus
         self.plants.append(robots)
         self._nodes[id(robots)] = bus.create_node("cable")
@@ -94,7 +109,15 @@ class Beside(Source):
     def _up(self, robots: Plant, sample: Sample[Any]) -> None:
         if sample.publisher.node is self._nodes[id(robots)] or sample.topic in _NOT_CARRIED:
             return
-        self._carry(self._node, id(robots), sample, self.alters)
+        only = self._only[id(robots)]
+        if only and sample.topic.split("/")[1] not in only:
+            return
+        self._carry(self._node, id(robots), sample, self._comes_in)
+
+    def _comes_in(self, topic: str, message: Any) -> None:
+        self.alters(topic, message)
+        if self._clocks is not None:
+            self._clocks.stamp_anew(topic, message)
 
     def _down(self, sample: Sample[Any]) -> None:
         if sample.publisher.node is self._node or sample.topic.startswith("/twin/"):
@@ -109,7 +132,7 @@ class Beside(Source):
         node: Node,
         way: int,
         sample: Sample[Any],
-        alters: Callable[[str, Any], None] = lambda topic, message: None,
+        comes_in: Callable[[str, Any], None] = lambda topic, message: None,
     ) -> None:
         if self.is_cut:
             return
@@ -119,7 +142,7 @@ class Beside(Source):
             publisher = node.create_publisher(said.codec.cls, said.name, said.qos)
             self._publishers[way, sample.topic] = publisher
         message = publisher.codec.decode(sample.payload)
-        alters(sample.topic, message)
+        comes_in(sample.topic, message)
         self._count += 1
         due_ns = self._run.run.world.time_ns + self.delay_ns
         say = partial(publisher.publish, message, frozen=True)

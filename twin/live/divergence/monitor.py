@@ -20,7 +20,7 @@ from twin.live.divergence.causes import THRESHOLDS, causes
 from twin.live.divergence.events import Edge, EventPairs, Misalignment
 from twin.live.divergence.evidence import Evidence, Jump, ScanEvidence
 from twin.live.divergence.flow import Flow
-from twin.live.divergence.histories import Placed, PoseHistory
+from twin.live.divergence.histories import PoseHistory
 from twin.live.divergence.innovation import Believed, NisWindow, nis
 from twin.live.divergence.motion import Ratio, Ratios
 from twin.live.divergence.response import Response, Responses
@@ -99,13 +99,15 @@ class DivergenceMonitor:
         """Of the last step."""
         self.misaligned: dict[str, int] = {}
         self._told = told
-        self._odom_pose: Pose2 | None = None
-        """Of the latest odometry, by whatever clock."""
+        self._latest_odom: tuple[int | None, Pose2] | None = None
+        """Stamp, None if it is of another clock, and pose of the latest odometry."""
         self._begin()
 
     def clock_set(self, by_ns: int) -> None:
         """Begin anew, but for series and alarms: the robot's clock was set by so much [ns]."""
         self.alarms.clock_set(by_ns)
+        if self._latest_odom is not None:
+            self._latest_odom = None, self._latest_odom[1]
         self._begin()
 
     def _begin(self) -> None:
@@ -177,10 +179,11 @@ class DivergenceMonitor:
         newer = self._flows["odometry"].take(stamp_ns, now_ns)
         before = self._odom.latest
         self._odom_count.append(now_ns)
-        last, self._odom_pose = self._odom_pose, pose
         stands = abs(speed) < _STILL and abs(turn) < _STILL
-        if last is not None and self._begins(last, before, stamp_ns, pose, is_new=is_new, stands=stands):
-            self._jumped(stamp_ns, now_ns, last.inverse() @ pose, to_start=True)
+        begins = self._begins(stamp_ns, pose, is_new=is_new, stands=stands)
+        last, self._latest_odom = self._latest_odom, (stamp_ns, pose)
+        if last is not None and begins:
+            self._jumped(stamp_ns, now_ns, last[1].inverse() @ pose, to_start=True)
         elif before is not None:
             elapsed = abs(stamp_ns - before.stamp_ns) * 1e-9
             step = before.pose.inverse() @ pose
@@ -195,15 +198,16 @@ class DivergenceMonitor:
         self._responses.physical(stamp_ns, speed, turn)
         self._move(stamp_ns, speed, turn, physical=True)
 
-    def _begins(
-        self, last: Pose2, before: Placed | None, stamp_ns: int, pose: Pose2, *, is_new: bool, stands: bool
-    ) -> bool:
+    def _begins(self, stamp_ns: int, pose: Pose2, *, is_new: bool, stands: bool) -> bool:
         """Return whether odometry begins again, somewhere else than it had come to.
 
         After a silence, or by another clock: at its start by one who did not publish it, or exactly there at
         rest.
         """
-        if before is not None and abs(stamp_ns - before.stamp_ns) < _SILENT_NS:
+        if self._latest_odom is None:
+            return False
+        before_ns, last = self._latest_odom
+        if before_ns is not None and abs(stamp_ns - before_ns) < _SILENT_NS:
             return False
         step = last.inverse() @ pose
         if math.hypot(step.x, step.y) < _JUMP and abs(step.yaw) < _JUMP_TURN:

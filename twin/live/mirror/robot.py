@@ -158,7 +158,7 @@ class MirroredRobot:
 
     def clock_changed(self, change: ClockChange) -> None:
         """Begin anew, where the virtual robot is, if the robot's clock was set; tell of it."""
-        if change.what == "clock":
+        if change.what != "pace":
             by_ns = change.set_by_ns if change.robot is None else 0  # of several robots none has our clock
             self.follower.forget()
             self.obedience.forget()
@@ -168,7 +168,8 @@ class MirroredRobot:
             self._stepped_ns = None
             if self.heard_ns is not None:
                 self.heard_ns += by_ns  # it was as long ago as before
-        self.tell(change.what, change.text)
+        if change.what != "met":
+            self.tell(change.what, change.text)
 
     def _run(self) -> Any:
         while True:

@@ -30,8 +30,8 @@ class ClockReading:
 class ClockChange:
     """The mirror's time, or that of what a robot says, does not go on as before."""
 
-    what: Literal["clock", "pace"]
-    """Whether a robot's clock was set, or this computer was too slow."""
+    what: Literal["clock", "met", "pace"]
+    """Whether a robot's clock was set, is known from now on, or this computer was too slow."""
     set_by_ns: int
     """How much later it is all at once [ns]."""
     robot: str | None = None
