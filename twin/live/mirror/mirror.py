@@ -76,7 +76,7 @@ class Mirror:
                 bag=bag,
                 clock=self.clock,
                 shown=shown.tap,
-                comparable=False,
+                endless=True,
                 layout=Layout(
                     autonomy=autonomy, hardware=NAMESPACE, commands="" if guard is None else COMMANDED
                 ),
