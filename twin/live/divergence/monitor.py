@@ -100,7 +100,7 @@ class DivergenceMonitor:
         self.misaligned: dict[str, int] = {}
         self._told = told
         self._latest_odom: tuple[int | None, Pose2] | None = None
-        """Stamp, None if it is of another clock, and pose of the latest odometry."""
+        """When it came, None if by another clock, and pose of the latest odometry."""
         self._begin()
 
     def clock_set(self, by_ns: int) -> None:
@@ -180,8 +180,8 @@ class DivergenceMonitor:
         before = self._odom.latest
         self._odom_count.append(now_ns)
         stands = abs(speed) < _STILL and abs(turn) < _STILL
-        begins = self._begins(stamp_ns, pose, is_new=is_new, stands=stands)
-        last, self._latest_odom = self._latest_odom, (stamp_ns, pose)
+        begins = self._begins(now_ns, pose, is_new=is_new, stands=stands)
+        last, self._latest_odom = self._latest_odom, (now_ns, pose)
         if last is not None and begins:
             self._jumped(stamp_ns, now_ns, last[1].inverse() @ pose, to_start=True)
         elif before is not None:
@@ -198,7 +198,7 @@ class DivergenceMonitor:
         self._responses.physical(stamp_ns, speed, turn)
         self._move(stamp_ns, speed, turn, physical=True)
 
-    def _begins(self, stamp_ns: int, pose: Pose2, *, is_new: bool, stands: bool) -> bool:
+    def _begins(self, now_ns: int, pose: Pose2, *, is_new: bool, stands: bool) -> bool:
         """Return whether odometry begins again, somewhere else than it had come to.
 
         After a silence, or by another clock: at its start by one who did not publish it, or exactly there at
@@ -207,7 +207,7 @@ class DivergenceMonitor:
         if self._latest_odom is None:
             return False
         before_ns, last = self._latest_odom
-        if before_ns is not None and abs(stamp_ns - before_ns) < _SILENT_NS:
+        if before_ns is not None and 0 <= now_ns - before_ns < _SILENT_NS:
             return False
         step = last.inverse() @ pose
         if math.hypot(step.x, step.y) < _JUMP and abs(step.yaw) < _JUMP_TURN:
