@@ -73,6 +73,13 @@ def test_autonomy_is_on_it_only_if_asked_for() -> None:
         assert drive(robots, 1.0)["odom"][-1].pose.pose.position.x > 0.05
 
 
+def test_it_is_there_when_its_mission_is_over() -> None:
+    scenario = load("diff_bot_figure8", {"mission.steps": "[{duration: 0.5 s, linear: 0.2 m/s}]"})
+    with Plant(scenario, network=SessionConfig(), pace=None, start_ns=START_NS, autonomy=True) as robots:
+        heard = drive(robots, 4.0)
+    assert ns(heard["odom"][-1].header.stamp) >= START_NS + 3_900_000_000
+
+
 def test_a_perturbed_wheel_drives_another_way_than_odometry_believes(tmp_path: Path) -> None:
     with plant("wheel_radius=0.9", truth=tmp_path / "truth.csv") as robots:
         believed = drive(robots, 3.0, speed=0.4)["odom"][-1].pose.pose.position.x

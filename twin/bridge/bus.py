@@ -71,6 +71,8 @@ class Bus:
         self.taps: list[Tap] = []
         self.arrival_taps: list[Callable[[Arrival], None]] = []
         """Called for everything from outside when it enters, before a node has it."""
+        self.incoming: Callable[[str, Any], None] | None = None
+        """Is shown each message of another process, and its topic, before a callback; may change it."""
         self.link: Link | None = None
         """What messages go through, if it is not perfect."""
         self.node_options: NodeOptions | None = None

@@ -76,7 +76,7 @@ class Plant:
                 pace=self._pace,
                 bag=bag,
                 clock=self.clock,
-                comparable=False,
+                endless=True,
                 layout=Layout(autonomy="all" if autonomy else "none"),
             )
             ending.callback(self.run.close)

@@ -89,7 +89,7 @@ class OpenRun:
         viewer: str | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
-        comparable: bool = True,
+        endless: bool = False,
         shown: Callable[[RerunSink], Callable[[Sample[Any]], None]] = lambda sink: sink.on_sample,
     ) -> None:
         """Build everything, up to the first tick.
@@ -115,8 +115,8 @@ class OpenRun:
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
-            comparable: Whether the hashes of each second are kept, for `twin diff`. They grow with the run:
-                one without an end does not keep them.
+            endless: Whether it goes on when its mission is over, until somebody ends it. Then the hashes of
+                each second, which `twin diff` reads, are not kept: they grow with the run.
             shown: Returns what passes samples on to the recording.
 
         Raises:
@@ -132,7 +132,7 @@ class OpenRun:
         self._sink = _recording(scenario, out, viewer) if record else None
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
-        self._comparable = comparable
+        self._endless = endless
         self.between_ticks: list[Callable[[], None]] = []
         """Called after each tick of `advance`."""
         self.when_alone: list[Callable[[], None]] = []
@@ -172,7 +172,7 @@ class OpenRun:
                 ending.callback(self._sink.close)
             if save_model is not None:
                 _save_model(parts, save_model)
-            self.run = Run(scenario, parts, self._sink, outside)
+            self.run = Run(scenario, parts, self._sink, outside, endless=endless)
             if self.run.lockstep is not None:
                 ending.callback(self.run.lockstep.close)
             if workers:
@@ -186,7 +186,7 @@ class OpenRun:
                 world = parts.world
                 self.run.wait = lambda: kept.keep(world.time_ns * 1e-9)
             self._ending = ending.pop_all()
-            if out is not None and comparable:
+            if out is not None and not endless:
                 self._ending.callback(lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
 
@@ -217,7 +217,7 @@ class OpenRun:
         with self._executed.going_on(), self._timed():
             while not run.over:
                 run.tick()
-                if self._comparable and run.world.time_ns >= self.digest.second_ends_ns:
+                if not self._endless and run.world.time_ns >= self.digest.second_ends_ns:
                     self.digest.end_second(run.world.state_digest())
                 for each in self.between_ticks:
                     each()

@@ -36,9 +36,15 @@ class Run:
     """So many phases are over when all nodes have run and nothing has been done yet: an agent's place."""
 
     def __init__(
-        self, scenario: Scenario, parts: Parts, sink: RerunSink | None = None, outside: Outside = ALONE
+        self,
+        scenario: Scenario,
+        parts: Parts,
+        sink: RerunSink | None = None,
+        outside: Outside = ALONE,
+        *,
+        endless: bool = False,
     ) -> None:
-        self.scenario = scenario
+        self.scenario, self._endless = scenario, endless
         self.parts = parts
         self.world, self.bus = parts.world, parts.bus
         self._clock_publisher: Publisher[Any] | None = None
@@ -217,6 +223,6 @@ class Run:
             self._check()
         if self._sink is not None:
             self._sink.on_tick(self.world)
-        if self.parts.mission.done and self._mission_end_ns is None:
+        if self.parts.mission.done and self._mission_end_ns is None and not self._endless:
             self._mission_end_ns = now
             self._end_ns = min(self._end_ns, now + _SETTLE_NS)

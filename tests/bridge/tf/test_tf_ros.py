@@ -37,6 +37,23 @@ S = 1_000_000_000
 identity = Pose3.from_xyz_rpy()
 
 
+def test_what_a_clock_stamped_before_it_was_set_back_is_not_the_latest(bus: Bus) -> None:
+    TransformListener(buffer := TransformBuffer(), bus.create_node("listener"))
+    driver = TransformBroadcaster(bus.create_node("driver"))
+
+    def moved(now_ns: int, stamp_ns: int, x: float) -> float:
+        bus.clock.now_ns = now_ns
+        pose = Pose3.from_xyz_rpy((x, 0.0, 0.0))
+        driver.send_transform(transform_stamped("odom", "base", stamp_ns, pose))
+        bus.spin()
+        return buffer.lookup_planar("odom", "base").x
+
+    assert moved(4000 * S, 4000 * S, 1.0) == 1.0
+    assert moved(400 * S, 400 * S, 2.0) == 2.0
+    assert moved(400 * S + 1, 4000 * S + 1, 3.0) == 2.0, "it was under way"
+    assert moved(401 * S, 401 * S, 4.0) == 4.0
+
+
 def test_an_error_names_who_broadcast(bus: Bus) -> None:
     TransformListener(buffer := TransformBuffer(), bus.create_node("listener"))
     driver = TransformBroadcaster(bus.create_node("driver", "/robot"))

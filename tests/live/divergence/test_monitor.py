@@ -232,3 +232,37 @@ def test_what_is_planted_is_named_and_nothing_else(planted: str) -> None:
     assert {alarm.cause for alarm in alarms} == causes, [alarm.text for alarm in alarms]
     if world.radius == world.track == 1.0:
         assert all(alarm.begin_ns >= START_NS + FAULT_S * 1e9 for alarm in alarms)
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "pose", "speed", "is_new", "is_restart"),
+    [
+        (2.0, MIDDLE, 0.0, False, True),
+        (60.0, MIDDLE, 0.0, False, True),
+        (2.0, Pose2(0.1, 0.0, 0.1), 0.3, True, True),
+        (2.0, Pose2(0.1, 0.0, 0.1), 0.3, False, False),
+        (2.0, MIDDLE, 0.3, False, False),
+        (2.0, Pose2(3.0, 1.0, 0.0), 0.0, True, False),
+        (0.04, MIDDLE, 0.0, True, False),
+    ],
+)
+@pytest.mark.parametrize("set_by_s", [None, -5000, 5000])
+def test_a_robot_that_starts_again_is_told_from_one_that_comes_by_its_start(
+    silent_s: float, pose: Pose2, speed: float, is_new: bool, is_restart: bool, set_by_s: int | None
+) -> None:
+    if set_by_s is not None and silent_s < 1.0:
+        pytest.skip("how long it was silent is not known by another clock")
+    monitor, covariance = DivergenceMonitor(), np.zeros(36)
+    now = START_NS
+    for tick in range(100):
+        now = START_NS + tick * TICK_NS
+        monitor.odometry(now, Pose2(2.0 + 0.01 * tick, 1.0, 0.0), covariance, 0.25, 0.0, now)
+        monitor.step(now)
+    now += round(silent_s * 1e9)
+    if set_by_s is not None:
+        now += set_by_s * 1_000_000_000
+        monitor.clock_set(set_by_s * 1_000_000_000)
+    monitor.odometry(now, pose, covariance, speed, 0.0, now, is_new=is_new)
+    monitor.step(now)
+    told = {alarm.cause for alarm in monitor.alarms.active}
+    assert ("robot restarted" in told) == is_restart

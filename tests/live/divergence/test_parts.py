@@ -195,3 +195,13 @@ def test_how_late_and_how_much_wheels_answer_is_found(late_s: float) -> None:
     found = responses.report()
     assert found.latency_s == pytest.approx(late_s, abs=0.01)
     assert found.ratio == pytest.approx(0.7, abs=0.03)
+
+
+def test_an_alarm_lasts_as_long_by_a_clock_that_was_set() -> None:
+    alarms = Alarms({"heat": Threshold(on=2.0, off=1.0, for_s=0.0, until_s=1.0)})
+    alarms.update(5000 * SECOND, [Finding(cause="heat", number=3.0, text="")])
+    alarms.clock_set(-4000 * SECOND)
+    alarms.update(1000 * SECOND + SECOND // 2, [])
+    assert alarms.active
+    alarms.update(1001 * SECOND, [])
+    assert not alarms.active

@@ -63,11 +63,33 @@ def test_a_robot_that_drives_less_than_its_model_is_followed() -> None:
     assert pair.apart[0] < 0.012  # drifts 12 mm/s; a measurement every 0.2 s, 0.1 s old, and a gain of 4/s
 
 
-def test_far_away_it_is_put_there_once() -> None:
+def test_far_away_it_is_put_there_once_and_not_before_it_has_been_found_there_for_a_while() -> None:
     pair = Pair(Pose2(5.0, 0.0, 1.0), Pose2(0.0, 0.0, 0.0), late=10)
+    pair.drive(95)
+    assert pair.follower.resets == 0
+    assert max(speed for speed, _ in pair.corrections) < 1e-9, "until then it is left alone"
+    pair.drive(50)
+    assert pair.follower.resets == 1
+    assert pair.apart[0] < 1e-3
+
+
+def test_localisation_that_finds_it_here_and_there_puts_it_elsewhere_once() -> None:
+    pair = Pair(Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0))
+    for place in (Pose2(3.0, 1.0, 0.5), Pose2(0.0, 0.0, 0.0), Pose2(-2.0, 1.0, 2.0), Pose2(4.0, 2.0, 1.0)):
+        pair.drive(60)
+        pair.physical = place
+    pair.drive(60)
+    assert pair.follower.resets == 0
     pair.drive(100)
     assert pair.follower.resets == 1
     assert pair.apart[0] < 1e-3
+
+
+def test_a_virtual_robot_that_is_left_behind_does_not_wait() -> None:
+    pair = Pair(Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), scale=4.0)
+    pair.drive(300)
+    assert pair.follower.resets >= 1
+    assert pair.apart[0] < 0.6
 
 
 def test_a_difference_is_of_the_time_of_the_measurement() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -91,3 +93,46 @@ def test_a_robot_that_starts_again_is_followed_again_and_that_is_told(endpoint: 
         clocks = [event for event in watched.robot.events if event.what == "clock"]
         assert len(clocks) == 1
         assert "set by +3" in clocks[0].text
+
+
+MUTE = """
+import sys, time
+from twin.bridge import live
+from twin.bridge.msgs import Odometry, TFMessage, TransformStamped, header, new
+from twin.bridge.node.options import BARE
+
+with live.join((), listen=[sys.argv[1]]) as process:
+    node = process.bus.create_node("driver", options=BARE)
+    odometry, transforms = (
+        node.create_publisher(*each) for each in ((Odometry, "/odom", 10), (TFMessage, "/tf", 100))
+    )
+
+    def tell():
+        stamp = header(time.time_ns() + 3600_000_000_000, "odom")
+        odometry.publish(new(Odometry, header=stamp, child_frame_id="base_footprint"))
+        transforms.publish(
+            TFMessage(transforms=[new(TransformStamped, header=stamp, child_frame_id="base_footprint")])
+        )
+
+    node.create_timer(20_000_000, tell)
+    process.spin()
+"""
+
+
+def test_a_robot_that_answers_no_question_is_followed_by_what_it_says_and_that_is_told(
+    endpoint: str,
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", MUTE, endpoint]) as robot:
+        try:
+            wait_for_listener(endpoint)
+            with closing(Watched(endpoint)) as watched:
+                assert watched.until(lambda: watched.robot.difference is not None)
+                (status,) = watched.mirror.statuses()
+                assert status.judgement.label == "shadow"
+                said = "the robot answers no question: its clock is known by its fastest messages alone"
+                assert said in status.judgement.why
+                assert status.clock_offset_s is not None
+                assert 3600.0 - 0.5 < status.clock_offset_s < 3600.01, "too little by what a message takes"
+                assert [event.what for event in watched.robot.events if event.what == "clock"] == []
+        finally:
+            robot.kill()

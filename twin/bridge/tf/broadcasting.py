@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _DYNAMIC = QoS(depth=100)
 _STATIC_LISTENER = QoS(depth=100, durability="transient_local")
 _EXPIRY_NS = 10_000_000
+_UNDER_WAY_NS = 1_000_000_000
+"""After a clock was set back, something by the time before may come for so long."""
 """How often waits are looked at that may have to be given up [ns]."""
 
 
@@ -69,6 +71,9 @@ class TransformListener:
         self._refused: set[str] = set()
         self._broadcasters: dict[bytes, Broadcaster] = {}
         self._expires = False
+        self._heard_ns = 0
+        self._set_back: tuple[int, int] | None = None
+        """What the node's clock showed before and after it was set back [ns], a moment ago."""
         self.on_message: list[Callable[[TFMessage, object], None]] = []
         """Called with every message, which is left as it is, and its broadcaster, whose `str` is its name."""
         for topic, qos, static in (("/tf", _DYNAMIC, False), ("/tf_static", _STATIC_LISTENER, True)):
@@ -104,14 +109,27 @@ class TransformListener:
 
         subscription = self._node.create_subscription(TFMessage, topic, on_message, qos, frozen=True)
 
+    def _look_at_clock(self) -> None:
+        """Forget, as tf2_ros does, what a clock has stamped that was set back: it would be the latest."""
+        now_ns, before_ns = self._node.now_ns, self._heard_ns
+        self._heard_ns = now_ns
+        if now_ns < before_ns:
+            self.buffer.clear()
+            self._set_back = before_ns, now_ns
+        elif self._set_back is not None and now_ns - self._set_back[1] > _UNDER_WAY_NS:
+            self._set_back = None
+
     def _expire(self) -> None:
         self.buffer.waiting.expire(self._node.now_ns)
 
     def _on_message(self, message: TFMessage, static: bool, gid: bytes | None) -> None:
+        self._look_at_clock()
         authority = self._broadcaster(gid)
         for callback in self.on_message:
             callback(message, authority)
         for item in message.transforms:
+            if not static and self._set_back is not None and 2 * ns(item.header.stamp) > sum(self._set_back):
+                continue  # it was under way when the clock was set
             try:
                 t, q = item.transform.translation, item.transform.rotation
                 self.buffer.set_rigid(

@@ -329,6 +329,9 @@ class Subscription(Endpoint, Generic[M]):
             received = read(self.node.bus.external, self.name, self.codec, payload)
             if received is None:
                 return
+            incoming = self.node.bus.incoming
+            if incoming is not None and external and isinstance(origin, Attachment):
+                incoming(self.name, received)
             message, self._origin = received, origin
         self._callback(message)
         self._origin = None

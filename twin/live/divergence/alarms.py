@@ -71,6 +71,15 @@ class Alarms:
         """Those that ended, and those that last."""
         return (*self._ended, *self._active.values())
 
+    def clock_set(self, by_ns: int) -> None:
+        """Let what lasts have lasted as long by a clock that was set [ns]."""
+        for stamps in (self._since, self._last):
+            for cause in stamps:
+                stamps[cause] += by_ns
+        self._active = {
+            cause: replace(alarm, begin_ns=alarm.begin_ns + by_ns) for cause, alarm in self._active.items()
+        }
+
     def update(self, now_ns: int, findings: list[Finding]) -> None:
         """Take what is found now; a cause that is not among it has gone."""
         found = {finding.cause: finding for finding in findings}

@@ -18,7 +18,7 @@ THRESHOLDS = {
     "lossy link": Threshold(on=0.15, off=0.08, for_s=2.0),  # share of messages
     "invalid data": Threshold(on=1.0, off=1.0, for_s=0.0),  # messages
     "duplicate robot": Threshold(on=0.15, off=0.05, for_s=1.0),  # share of messages, or 1 for each robot more
-    "robot restarted": Threshold(on=0.0, off=0.0, for_s=0.6),  # [m]
+    "robot restarted": Threshold(on=0.0, off=0.0, for_s=0.0),  # [m]
     "odometry jump": Threshold(on=0.3, off=0.3, for_s=0.6),  # [m] or [rad]
     "blind lidar": Threshold(on=0.4, off=0.2, for_s=1.0),  # share of rays
     "obstacle not in the model": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans

@@ -57,6 +57,10 @@ behind what is expected; or if what is explained differs by so much [m]. What st
 of it, but makes no ray longer."""
 _BREAK = 0.3
 """So much less of a scan is explained than of the one before it: one of the two robots was moved."""
+_START = 0.02
+"""Odometry that begins is so near to where it begins [m], [rad]."""
+_SILENT_NS = 300_000_000
+"""A robot that starts again has said nothing for so long."""
 _STILL = 1e-3
 """A robot whose wheels turn slower stands [m/s], [rad/s]."""
 
@@ -95,10 +99,15 @@ class DivergenceMonitor:
         """Of the last step."""
         self.misaligned: dict[str, int] = {}
         self._told = told
+        self._latest_odom: tuple[int | None, Pose2] | None = None
+        """When it came, None if by another clock, and pose of the latest odometry."""
         self._begin()
 
-    def forget(self) -> None:
-        """Begin anew, but for series and alarms: the robot's clock was set."""
+    def clock_set(self, by_ns: int) -> None:
+        """Begin anew, but for series and alarms: the robot's clock was set by so much [ns]."""
+        self.alarms.clock_set(by_ns)
+        if self._latest_odom is not None:
+            self._latest_odom = None, self._latest_odom[1]
         self._begin()
 
     def _begin(self) -> None:
@@ -142,9 +151,27 @@ class DivergenceMonitor:
     # What is heard
 
     def odometry(
-        self, stamp_ns: int, pose: Pose2, covariance: Array, speed: float, turn: float, now_ns: int
+        self,
+        stamp_ns: int,
+        pose: Pose2,
+        covariance: Array,
+        speed: float,
+        turn: float,
+        now_ns: int,
+        *,
+        is_new: bool = False,
     ) -> None:
-        """Take the physical robot's odometry, which came at `now_ns`; covariance is ROS's, shape (36,)."""
+        """Take the physical robot's odometry, which came at `now_ns`.
+
+        Args:
+            stamp_ns: Of the message.
+            pose: In the frame of odometry.
+            covariance: ROS's, shape (36,).
+            speed: Forwards [m/s].
+            turn: [rad/s].
+            now_ns: When it came.
+            is_new: Whether somebody publishes it who never did, and nobody else does any more.
+        """
         if not (all(map(math.isfinite, pose)) and math.isfinite(speed) and math.isfinite(turn)):
             self._flows["odometry"].take(stamp_ns, now_ns)
             self.invalid(now_ns)
@@ -152,24 +179,51 @@ class DivergenceMonitor:
         newer = self._flows["odometry"].take(stamp_ns, now_ns)
         before = self._odom.latest
         self._odom_count.append(now_ns)
-        if before is not None:
+        stands = abs(speed) < _STILL and abs(turn) < _STILL
+        begins = self._begins(now_ns, pose, is_new=is_new, stands=stands)
+        last, self._latest_odom = self._latest_odom, (now_ns, pose)
+        if last is not None and begins:
+            self._jumped(stamp_ns, now_ns, last[1].inverse() @ pose, to_start=True)
+        elif before is not None:
             elapsed = abs(stamp_ns - before.stamp_ns) * 1e-9
             step = before.pose.inverse() @ pose
             if (
                 math.hypot(step.x, step.y) > _JUMP + _FASTEST * elapsed
                 or abs(step.yaw) > _JUMP_TURN + _FASTEST_TURN * elapsed
             ):
-                to_start = math.hypot(pose.x, pose.y) < _JUMP and elapsed > 0.3
-                self._jumps.append((now_ns, step, to_start))
-                self._jumped_ns = stamp_ns
-                self._odom.clear()
-                self._begin_motion()
-                self._responses.clear()
+                self._jumped(stamp_ns, now_ns, step, to_start=False)
             elif not newer:
                 return
         self._odom.add(stamp_ns, pose, covariance)
         self._responses.physical(stamp_ns, speed, turn)
         self._move(stamp_ns, speed, turn, physical=True)
+
+    def _begins(self, now_ns: int, pose: Pose2, *, is_new: bool, stands: bool) -> bool:
+        """Return whether odometry begins again, somewhere else than it had come to.
+
+        After a silence, or by another clock: at its start by one who did not publish it, or exactly there at
+        rest.
+        """
+        if self._latest_odom is None:
+            return False
+        before_ns, last = self._latest_odom
+        if before_ns is not None and 0 <= now_ns - before_ns < _SILENT_NS:
+            return False
+        step = last.inverse() @ pose
+        if math.hypot(step.x, step.y) < _JUMP and abs(step.yaw) < _JUMP_TURN:
+            return False
+        away, turned = math.hypot(pose.x, pose.y), abs(pose.yaw)
+        if is_new:
+            return away < _JUMP and turned < _JUMP_TURN
+        return stands and away < _START and turned < _START
+
+    def _jumped(self, stamp_ns: int, now_ns: int, step: Pose2, *, to_start: bool) -> None:
+        self._jumps.append((now_ns, step, to_start))
+        self._jumped_ns = stamp_ns
+        self._odom.clear()
+        self._begin_motion()
+        self._responses.clear()
+        self._stepped_ns = None  # that is not put off
 
     def virtual_odometry(self, stamp_ns: int, pose: Pose2, speed: float, turn: float) -> None:
         """Take the virtual robot's odometry."""
@@ -450,6 +504,8 @@ class DivergenceMonitor:
         since = now_ns - _RECENT_NS
         flows = {name: flow.report(now_ns) for name, flow in self._flows.items()}
         recent = [jump for jump in self._jumps if now_ns - jump[0] < 3 * _SECOND_NS]
+        if not recent and self._jumps and self._jumps[-1][2] and self._is_unsure(now_ns):
+            recent = [self._jumps[-1]]  # it has begun again, and has not been found yet
         count = sum(1 for stamp in self._odom_count if now_ns - stamp < 3 * _SECOND_NS)
         jumped = None
         if recent:
@@ -491,6 +547,9 @@ class DivergenceMonitor:
             nis=self._nis.mean,
             nis_bound=None if bounds is None else bounds[1],
         )
+
+    def _is_unsure(self, now_ns: int) -> bool:
+        return self._unsure_ns is not None and 0 <= now_ns - self._unsure_ns < _SECOND_NS
 
     def _scan_evidence(self, now_ns: int) -> ScanEvidence | None:
         latest = [one for one in self._matches if 0 <= now_ns - one.stamp_ns < 2 * _SECOND_NS][-10:]

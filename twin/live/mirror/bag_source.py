@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,9 @@ from twin.bridge.bags.reader import BagReader
 from twin.bridge.cdr.codec import codec
 from twin.bridge.topics import Publisher
 from twin.errors import BridgeError, RecordingError
-from twin.live.mirror.source import Source
+from twin.live.mirror.least_delay import LeastDelay
+from twin.live.mirror.robot_clocks import RobotClocks
+from twin.live.mirror.source import ClockChange, ClockReading, Source
 
 if TYPE_CHECKING:
     from twin.live.mirror.followed_clock import FollowedClock
@@ -22,15 +24,15 @@ if TYPE_CHECKING:
 
 _OWN = "/twin/"
 _NOT_PLAYED = ("/clock", "/rosout", "/parameter_events", "/diagnostics")
-_WINDOW_NS = 10_000_000_000
 _LARGEST_STEP_NS = 500_000_000
 
 
 class BagSource(Source):
     """A bag's messages by the time at which they were received.
 
-    The robots' clock is that of the times of publishing. It is ahead of the recorder's by what the fastest
-    message of the last seconds tells; a mirror's own messages, if the bag has some, tell it best.
+    The robot's clock is that of the times of publishing. It is ahead of the recorder's by what the fastest
+    message of the last seconds tells; a mirror's own messages, if the bag has some, tell it best. Each of
+    several robots has its own, and the mirror's is the recorder's.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,8 +50,11 @@ class BagSource(Source):
         self._messages = self._bag.messages()
         self._next: BagMessage | None = next(self._messages, None)
         self._start_ns = 0 if self._next is None else self._next.log_ns
-        self._ahead: deque[tuple[int, int]] = deque()
-        """Log time, and how far the robots' clock was ahead at least [ns]; falling."""
+        self._ahead: dict[str, LeastDelay] = {}
+        """Of each robot's clock to the recorder's."""
+        self._robots: dict[str, str] = {}
+        """By the beginning of their topics' names, if there are several."""
+        self._clocks: RobotClocks | None = None
         self._publishers: dict[str, Publisher[Any] | None] = {}
 
     @property
@@ -57,15 +62,12 @@ class BagSource(Source):
         """When the first message was published."""
         return self._start_ns if self._next is None else self._next.publish_ns
 
-    @property
-    def clock_bound_s(self) -> float | None:
+    def reading(self, robot: str) -> ClockReading:
         """Nothing bounds what the fastest message took, unless a mirror was there."""
-        return 0.0 if self._has_own else None
-
-    @property
-    def clock_offset_s(self) -> float | None:
-        """As the fastest message tells [s]: too little by what it took."""
-        return self._ahead[0][1] * 1e-9 if self._ahead else None
+        ahead_ns = self._ahead[robot].ahead_ns
+        is_bounded = self._has_own and self._clocks is None
+        offset_s = None if ahead_ns is None else ahead_ns * 1e-9
+        return ClockReading(offset_s=offset_s, bound_s=0.0 if is_bounded else None)
 
     @property
     def over(self) -> bool:
@@ -75,19 +77,34 @@ class BagSource(Source):
     def begin(self, run: OpenRun, clock: FollowedClock) -> None:
         """Play what is there at the start."""
         self._run, self._clock = run, clock
+        stacks = run.run.parts.stacks
+        self._ahead = {name: LeastDelay() for name in stacks}
+        if len(stacks) > 1:
+            spaces = {name: stack.context.namespace for name, stack in stacks.items()}
+            self._robots = {f"{space}/": name for name, space in spaces.items()}
+            self._clocks = RobotClocks(clock, spaces)
         self._node = run.run.bus.create_node("rosbag2_player")
         self._play()
 
-    def after_tick(self) -> tuple[str, str] | None:
+    def after_tick(self) -> Sequence[ClockChange]:
         """Play what was received up to now."""
         self._play()
-        if not self._ahead:
-            return None
-        log_ns = self._start_ns + self._run.run.world.time_ns
-        set_by = self._clock.follow(log_ns + self._ahead[0][1], 0) * 1e-9
-        if set_by >= 0.0 and set_by < _LARGEST_STEP_NS * 1e-9:
-            return None
-        return "clock", f"the robot's clock was set by {set_by:+.3f} s"
+        elapsed_ns = self._run.run.world.time_ns
+        log_ns = self._start_ns + elapsed_ns
+        if self._clocks is None:
+            (ahead,) = self._ahead.values()
+            if ahead.ahead_ns is None:
+                return ()
+            set_by_ns = self._clock.follow(log_ns + ahead.ahead_ns, 0)
+            if 0 <= set_by_ns < _LARGEST_STEP_NS:
+                return ()
+            return (ClockChange(what="clock", set_by_ns=set_by_ns),)
+        self._clock.follow(log_ns, 0)
+        known = {name: ahead.ahead_ns for name, ahead in self._ahead.items() if ahead.ahead_ns is not None}
+        changes: list[ClockChange] = []
+        for name, ahead_ns in known.items():
+            changes += self._clocks.follow(name, elapsed_ns, log_ns + ahead_ns, 0)
+        return changes
 
     def close(self) -> None:
         """Close the bag."""
@@ -97,21 +114,20 @@ class BagSource(Source):
         log_ns = self._start_ns + self._run.run.world.time_ns
         while self._next is not None and self._next.log_ns <= log_ns:
             message = self._next
-            if message.topic.startswith(_OWN) or not self._has_own:
-                self._learn(message)
+            self._learn(message)
             if message.topic in self._played:
                 self._publish(message)
             self._next = next(self._messages, None)
 
     def _learn(self, message: BagMessage) -> None:
-        ahead, window = message.publish_ns - message.log_ns, self._ahead
-        if window and abs(ahead - window[0][1]) > _LARGEST_STEP_NS:
-            window.clear()  # a clock was set
-        while window and window[-1][1] <= ahead:
-            window.pop()
-        window.append((message.log_ns, ahead))
-        while message.log_ns - window[0][0] > _WINDOW_NS:
-            window.popleft()
+        if self._robots:
+            space = message.topic[: message.topic.find("/", 1) + 1]
+            robot = self._robots.get(space)
+        else:
+            is_best = message.topic.startswith(_OWN) or not self._has_own
+            robot = next(iter(self._ahead)) if is_best else None
+        if robot is not None:
+            self._ahead[robot].take(message.publish_ns, message.log_ns)
 
     def _publish(self, message: BagMessage) -> None:
         if message.topic not in self._publishers:
@@ -119,7 +135,10 @@ class BagSource(Source):
         publisher = self._publishers[message.topic]
         if publisher is not None and publisher.has_subscribers:
             try:
-                publisher.publish(publisher.codec.decode(message.data), frozen=True)
+                told = publisher.codec.decode(message.data)
+                if self._clocks is not None:
+                    self._clocks.stamp_anew(message.topic, told)
+                publisher.publish(told, frozen=True)
             except BridgeError:
                 self._node.get_logger().warn(f"{message.topic}: a message that cannot be read is left out")
 

@@ -37,6 +37,8 @@ _DOUBTS = ("duplicate robot", "invalid data", "robot restarted", "odometry jump"
 _TALKS_NS = 1_000_000_000
 _TALKS = 5
 """Who sent so many messages in that time publishes a topic."""
+_SILENT_NS = 300_000_000
+"""Who has said nothing for so long does not publish any more."""
 _GRIPS = (0.02, 0.005)
 """A gripper's joint moves from that speed on, and stands below that one [m/s]."""
 _LASTS_NS = 200_000_000
@@ -60,6 +62,8 @@ class DivergenceNode:
         }
         self._alarms: dict[str, Alarm] = {}
         self._senders: dict[bytes, list[int]] = {}
+        self._sender: bytes | None = None
+        """Of the latest odometry."""
         self._grips = {side: Edge(*_GRIPS, _LASTS_NS) for side in (True, False)}
         self._touches = {side: Edge(0.5, 0.5, 0) for side in (True, False)}
         real, space = stack.context.namespace, stack.context.hardware_namespace
@@ -120,13 +124,25 @@ class DivergenceNode:
 
     def _on_odometry(self, message: Odometry) -> None:
         now_ns, twist, source = self.node.now_ns, message.twist.twist, self._odometry.source
+        is_new = False
         if source is not None:
-            sent = self._senders.setdefault(bytes(source.gid), [])
+            before, self._sender = self._sender, bytes(source.gid)
+            others = [sent[-1] for gid, sent in self._senders.items() if gid != self._sender]
+            is_new = before not in (None, self._sender) and not any(
+                0 <= now_ns - last < _SILENT_NS for last in others
+            )
+            sent = self._senders.setdefault(self._sender, [])
             sent.append(now_ns)
             del sent[:-_TALKS]
         pose, covariance = pose2_from_pose(message.pose.pose), message.pose.covariance
         self.monitor.odometry(
-            ns(message.header.stamp), pose, covariance, twist.linear.x, twist.angular.z, now_ns
+            ns(message.header.stamp),
+            pose,
+            covariance,
+            twist.linear.x,
+            twist.angular.z,
+            now_ns,
+            is_new=is_new,
         )
 
     def _count(self, now_ns: int) -> int | None:

@@ -30,7 +30,7 @@ class ClockExchanges:
         """The robot's clock minus `time.perf_counter`; None: nobody has answered yet."""
         self.answered_ns: int | None = None
         """When an answer came last, by `time.perf_counter_ns`."""
-        self._graph, self._topic, self._own = graph, topic, bus.session_id
+        self._graph, self.topic, self._own = graph, topic, bus.session_id
         self._client: Client | None = None
         self._asked_ns = 0
         self._answers: deque[tuple[int, int, int]] = deque(maxlen=_DEPTH)
@@ -58,7 +58,7 @@ class ClockExchanges:
         return now_ns + round(self.estimate.offset_s * 1e9) + round(drifted)
 
     def _ask(self, now_ns: int) -> None:
-        others = (end.node for end in self._graph.publishers(self._topic) if end.node.session_id != self._own)
+        others = (end.node for end in self._graph.publishers(self.topic) if end.node.session_id != self._own)
         server = next(others, None)
         if server is None:
             return

@@ -31,7 +31,14 @@ class FollowerConfig:
     gain: float = 10.0
     """Share of what is left that is corrected [1/s]."""
     reset_distance: float = 0.5
-    """Beyond it [m] the virtual robot is put where the physical one is, at once."""
+    """Beyond it [m] the virtual robot is put where the physical one is, at once ..."""
+    settled_ns: int = 2_000_000_000
+    """... if that one has been found there for so long: localisation that looks for a robot finds it at more
+    than one place."""
+    step: float = 0.1
+    """A robot that is found so much farther on [m] than it can have driven is found elsewhere ..."""
+    fastest: float = 3.0
+    """... where none drives faster [m/s]."""
     history_ns: int = 10_000_000_000
     """A measurement may be so old."""
 
@@ -71,10 +78,17 @@ class Follower:
         self._wanted = _STILL
         self._jumps = False
         self._noted: deque[_Noted] = deque()
+        self._found: tuple[int, Pose2] | None = None
+        """When, and where, the physical robot was seen last."""
+        self._settled_ns = 0
+        """Since when it has been where it can have driven."""
+        self._waits = False
+        """Whether it is far away, but not settled there."""
 
     def forget(self) -> None:
-        """Forget where the virtual robot was: what comes is stamped by another clock."""
+        """Forget where the robots were: what comes is stamped by another clock."""
         self._noted.clear()
+        self._found = None
 
     def note(self, stamp_ns: int, virtual: Pose2) -> None:
         """Remember where the virtual robot is; times may not go back."""
@@ -90,8 +104,10 @@ class Follower:
     def measured(self, stamp_ns: int, physical: Pose2) -> Difference | None:
         """Take in where the physical robot was; None, and nothing is learnt, if that is not remembered.
 
-        If it is farther away than `reset_distance`, the next step goes all the way.
+        If it is farther away than `reset_distance`, the next step goes all the way once it has settled there;
+        until then the virtual robot is left where it drives.
         """
+        self._settle(stamp_ns, physical)
         virtual, claimed = self.virtual_at(stamp_ns), self._at(stamp_ns, lambda noted: noted.claimed)
         if virtual is None or claimed is None:
             return None
@@ -103,9 +119,18 @@ class Follower:
             yaw=offset.yaw,
             prediction=claimed.distance(physical),
         )
-        if difference.position > self.config.reset_distance:
-            self._jumps = True
+        is_far = difference.position > self.config.reset_distance
+        self._jumps = is_far and stamp_ns - self._settled_ns >= self.config.settled_ns
+        self._waits = is_far and not self._jumps
         return difference
+
+    def _settle(self, stamp_ns: int, physical: Pose2) -> None:
+        found, self._found = self._found, (stamp_ns, physical)
+        if found is not None:
+            most = self.config.step + self.config.fastest * abs(stamp_ns - found[0]) * 1e-9
+            if found[1].distance(physical) <= most:
+                return
+        self._settled_ns = stamp_ns
 
     def _at(self, stamp_ns: int, pose: Callable[[_Noted], Pose2]) -> Pose2 | None:
         """Return a pose between those that are remembered, None outside of them."""
@@ -131,6 +156,8 @@ class Follower:
             self.resets += 1
             self.correction = self._wanted
             return wanted
+        if self._waits:
+            return virtual
         left = virtual.inverse() @ wanted
         distance = math.hypot(left.x, left.y)
         share = min(1.0, config.gain * elapsed_s)

@@ -46,6 +46,8 @@ class Evidence:
     """How far one was turned ahead of the other [rad]."""
     clock_bound_s: float | None = None
     """The robot's clock is known so well [s]; None: it is not."""
+    clock: str = "the robot's clock is not known"
+    """Why `clock_bound_s` is None, if it is."""
     acknowledged: bool = False
     """Whether what was last commanded from here was obeyed, as its acknowledgement or its motion tells."""
     commands: str = NOBODY
@@ -78,7 +80,7 @@ def judge(evidence: Evidence, config: LabelConfig = LabelConfig()) -> Judgement:
     if evidence.yaw is not None and abs(evidence.yaw) > config.yaw:
         why.append(f"it is turned {evidence.yaw:+.2f} rad from the physical robot")
     if evidence.clock_bound_s is None:
-        why.append("the robot's clock is not known")
+        why.append(evidence.clock)
     elif evidence.clock_bound_s > config.clock_s:
         why.append(f"the robot's clock is known to {evidence.clock_bound_s * 1e3:.0f} ms only")
     if not evidence.acknowledged:

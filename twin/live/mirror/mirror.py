@@ -79,7 +79,7 @@ class Mirror:
                 bag=bag,
                 clock=self.clock,
                 shown=shown.tap,
-                comparable=False,
+                endless=True,
                 layout=Layout(
                     autonomy=autonomy, hardware=NAMESPACE, commands="" if guard is None else COMMANDED
                 ),
@@ -144,12 +144,10 @@ class Mirror:
         take_over(self.run.run.bus, self.robots, own, self._drivers, NAMESPACE)
 
     def _after_tick(self) -> bool:
-        event = self.source.after_tick()
-        if event is not None:
+        for change in self.source.after_tick():
             for robot in self.robots:
-                if event[0] == "clock":
-                    robot.forget()
-                robot.tell(*event)
+                if change.robot in (None, robot.stack.name):
+                    robot.clock_changed(change)
         now_ns = self.run.run.world.time_ns
         if now_ns - self._told_ns >= _STATUS_NS:
             self._told_ns = now_ns

@@ -36,6 +36,10 @@ class Obedience:
         self._since_ns: int | None = None
         """When what is commanded began to differ from rest, or to be rest."""
 
+    def forget(self) -> None:
+        """Let the next command be the first: times are of another clock from now on."""
+        self._since_ns, self._told = None, (0.0, 0.0)
+
     def command(self, time_ns: int, linear: float, angular: float) -> None:
         """Take a command [m/s, rad/s]; one that is not finite is none."""
         if not math.isfinite(linear + angular):

@@ -21,7 +21,7 @@ from twin.live.mirror.follower import Difference, Follower, FollowerConfig
 from twin.live.mirror.holding import Holding
 from twin.live.mirror.label import Evidence, LabelConfig, judge
 from twin.live.mirror.obedience import Obedience
-from twin.live.mirror.source import Source
+from twin.live.mirror.source import ClockChange, Source
 from twin.live.mirror.status import Status
 from twin.live.mirror.told import Told
 from twin.nodes.messages import pose_stamped
@@ -134,14 +134,16 @@ class MirroredRobot:
     def status(self, now_ns: int, source: Source) -> Status:
         """Return how it is mirrored at a time of the robot's clock [ns]."""
         difference, heard_ns = self.difference, self.heard_ns
-        self.divergence.monitor.clock_bound_s = source.clock_bound_s or 0.0
+        clock = source.reading(self.stack.name)
+        self.divergence.monitor.clock_bound_s = clock.bound_s or 0.0
         acknowledged, commands = self._obeyed() if source.is_live else (False, "a bag obeys no commands")
         guarded = self.guard.status if self.guard is not None and self.guard.is_present else None
         evidence = Evidence(
             age_s=None if heard_ns is None else max(0.0, (now_ns - heard_ns) * 1e-9),
             position=None if difference is None else difference.position,
             yaw=None if difference is None else difference.yaw,
-            clock_bound_s=source.clock_bound_s,
+            clock_bound_s=clock.bound_s,
+            clock=clock.text,
             acknowledged=acknowledged,
             commands=commands,
             doubts=(*(() if guarded is None else guarded.warnings), *self.divergence.doubts),
@@ -152,7 +154,7 @@ class MirroredRobot:
             evidence=evidence,
             virtual=self._world.pose(self.stack.handle.base).to_pose2(),
             physical=self._physical,
-            clock_offset_s=source.clock_offset_s,
+            clock_offset_s=clock.offset_s,
             delay_s=self.told.delay_s,
             resets=self.follower.resets,
             alarms=self.divergence.words,
@@ -167,13 +169,20 @@ class MirroredRobot:
         """
         return None if self._T_odom_driven is None else self._T_odom_driven @ self._driven
 
-    def forget(self) -> None:
-        """Begin anew, where the virtual robot is: the robot's clock was set."""
-        self.follower.forget()
-        self.divergence.monitor.forget()
-        self._pending.clear()
-        self._latest_ns = -1
-        self._stepped_ns = None
+    def clock_changed(self, change: ClockChange) -> None:
+        """Begin anew, where the virtual robot is, if the robot's clock was set; tell of it."""
+        if change.what != "pace":
+            by_ns = change.set_by_ns if change.robot is None else 0  # of several robots none has our clock
+            self.follower.forget()
+            self.obedience.forget()
+            self.divergence.monitor.clock_set(by_ns)
+            self._pending.clear()
+            self._latest_ns = -1
+            self._stepped_ns = None
+            if self.heard_ns is not None:
+                self.heard_ns += by_ns  # it was as long ago as before
+        if change.what != "met":
+            self.tell(change.what, change.text)
 
     def _run(self) -> Any:
         while True:

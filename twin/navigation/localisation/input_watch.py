@@ -12,6 +12,10 @@ _MAX_SPEED = 3.0
 """Odometry that is faster than this has jumped [m/s]."""
 _MAX_TURN_RATE = 15.0
 """The same of turning [rad/s]."""
+_LATE_NS = 1_000_000_000
+"""What is older by less comes late; by more, it is of a clock that was set back."""
+_UNKNOWN_S = 0.1
+"""So much time counts as passed then [s]."""
 _FROZEN_AFTER = 5
 """So many equal scans in a row, while odometry moves, are one old scan."""
 _FROZEN_DISTANCE = 0.1
@@ -30,9 +34,9 @@ class InputWatch:
     def has_jumped(self, odom: Pose2, time_ns: int) -> bool:
         """Whether no motion can explain odometry at `time_ns` after the last one that was asked about."""
         before, self._odom = self._odom, (time_ns, odom)
-        if before is None or time_ns <= before[0]:
+        if before is None or 0 <= before[0] - time_ns < _LATE_NS:
             return False
-        elapsed = (time_ns - before[0]) * 1e-9
+        elapsed = abs(time_ns - before[0]) * 1e-9 if time_ns > before[0] else _UNKNOWN_S
         turned = abs(wrap_angle(odom.yaw - before[1].yaw))
         fast = before[1].distance(odom) > _MAX_SPEED * elapsed
         return fast or turned > min(_MAX_TURN_RATE * elapsed, 3.1)
