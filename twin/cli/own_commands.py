@@ -52,7 +52,7 @@ TABLE = {
     "plant": Command(_SCENARIOS, "Run a scenario's robots in real time as if they were hardware.", "live.plant", "plant", "twin plant warehouse --perturb wheel_radius=0.97,latency=80ms,clock_offset=0.4s", needs_arguments=True),
     "mirror": Command(_SCENARIOS, "Keep virtual robots with physical ones of the same names, and tell how far apart they are.", "live.mirror", "mirror", "twin mirror warehouse --autonomy all", needs_arguments=True),
     "fork": Command(_SCENARIOS, "Run futures of a run, or of a mirror, that goes on, and tell how they end.", "live.fork", "fork", "twin fork --n 8 --goal -5,-3,0 --set friction=0.5"),
-    "calibrate": Command(_SCENARIOS, "Estimate wheels, delays and sensors of a physical robot from a bag, and patch the scenario.", "live.calibrate", "calibrate", "twin calibrate hall.yaml drive -o calibrated.yaml", needs_arguments=True),
+    "calibrate": Command(_SCENARIOS, "Estimate wheels, delays and sensors of a physical robot, from a bag or live, and patch the scenario.", "live.calibrate", "calibrate", "twin calibrate hall.yaml drive -o calibrated.yaml", needs_arguments=True),
     "play": Command(_SCENARIOS, "Open a recording in the Rerun viewer.", "play", "play", "twin play runs/warehouse/20261121-101500", needs_arguments=True),
     "new": Command(_SCENARIOS, "Write a small project that runs as it is: a robot, an arena, a scenario, a check, a test, a CI file.", "new", "new", "twin new my_robot", needs_arguments=True),
     "scenarios": Command(_SCENARIOS, "List the scenarios that `twin run` knows by name: those in the folder `scenarios`, and shipped ones.", "listings", "scenarios", "twin scenarios"),

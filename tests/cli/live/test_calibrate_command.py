@@ -48,6 +48,8 @@ def test_what_is_printed_and_written(folder: Path, invoke: Any, monkeypatch: pyt
         (["room.yaml", "drive", "--robot", "x"], "scenario 'room' has no robot 'x'"),
         (["room.yaml", "drive", "-o", "."], "--output .: cannot be written: it is a folder; name a file"),
         (["room.yaml", "drive", "--set", "robots.0.pose.x=20"], "give its start with --set robots.0.pose"),
+        (["room.yaml", "--live", "--robot", "x"], "scenario 'room' has no robot 'x'"),
+        (["room.yaml", "--live", "--connect", "tcp/127.0.0.1:1"], "tcp/127.0.0.1:1"),
     ],
 )
 def test_trouble_is_one_sentence(
@@ -58,3 +60,18 @@ def test_trouble_is_one_sentence(
     assert (code, out) == (2, "")
     assert why in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        ([], "Invalid value for BAG: a bag, or --live instead of it"),
+        (["drive", "--live"], "Invalid value for BAG: a bag, or --live instead of it"),
+        (["drive", "--record", "own"], "Invalid value for --record: only --live records"),
+        (["--live", "--for", "15"], "Invalid value for --for: 15: must be at least 16 s"),
+    ],
+)
+def test_options_that_do_not_go_together_are_told(invoke: Any, arguments: list[str], why: str) -> None:
+    code, out, err = invoke("calibrate", "diff_bot_figure8", *arguments)
+    assert (code, out) == (2, "")
+    assert why in " ".join(err.split())

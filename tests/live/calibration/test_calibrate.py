@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.measures.calibration import planted, record, room
+from benchmarks.measures.calibration import START_NS, planted, record, room
 from twin.bridge.bags.metadata import BagMessage
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bags.writer import BagWriter
 from twin.bridge.cdr.codec import codec
 from twin.errors import RecordingError, ScenarioError
+from twin.geometry import Pose2, yaw_from_quat_wxyz
 from twin.live.calibration.calibrate import Calibration, calibrate
 from twin.live.calibration.estimates import Estimate
-from twin.live.calibration.recorded import Recorded, read
+from twin.live.calibration.recorded import Recorded, read, topics_of
 from twin.scenario.schema import load
 
 SECONDS = 24.0
@@ -166,6 +168,36 @@ def test_a_bag_of_another_room_is_refused(folder: Path, drive: tuple[Path, Any])
         calibrate(empty, drive[0])
 
 
+def test_a_robot_that_had_driven_before_is_found_by_its_odometry_and_localisation(
+    folder: Path, drive: tuple[Path, Any]
+) -> None:
+    before = Pose2(30.0, -10.0, 2.0)
+    T_map_odom = before.inverse()
+
+    def later(topic: str, message: Any, time_ns: int) -> tuple[Any, int] | None:
+        if topic == "/odom":
+            pose = message.pose.pose
+            x, y, yaw = before @ Pose2(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+            pose.position.x, pose.position.y = x, y
+            pose.orientation.z, pose.orientation.w = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+        if topic == "/tf":
+            found = message.transforms[0]
+            found.header.frame_id, found.child_frame_id = "map", "odom"
+            found.transform.translation.x, found.transform.translation.y = T_map_odom.x, T_map_odom.y
+            found.transform.rotation.z = math.sin(T_map_odom.yaw / 2.0)
+            found.transform.rotation.w = math.cos(T_map_odom.yaw / 2.0)
+        return (message, time_ns) if time_ns < START_NS + 16_000_000_000 else None
+
+    bag = altered(drive[0], folder / "later", later)
+    elsewhere = load(folder / "room.yaml", {"robots.0.pose.yaw": "100 deg"})
+    found = calibrate(elsewhere, bag)
+    assert named(found)["track"].factor == pytest.approx(1.02, abs=5e-3)
+
+
+def yaw_of(q: Any) -> float:
+    return yaw_from_quat_wxyz((q.w, q.x, q.y, q.z))
+
+
 def test_what_is_not_a_number_is_left_out_and_told(folder: Path, drive: tuple[Path, Any]) -> None:
     def some_nan(topic: str, message: Any, time_ns: int) -> tuple[Any, int] | None:
         if topic == "/joint_states" and time_ns % 1_000_000_000 == 0:
@@ -179,7 +211,7 @@ def test_what_is_not_a_number_is_left_out_and_told(folder: Path, drive: tuple[Pa
 
 
 def wheels_of(bag: Path) -> Recorded:
-    return read(bag, "", ["wheel_left_joint"], ["wheel_right_joint"], "scan")
+    return read(bag, topics_of("", "scan"), ["wheel_left_joint"], ["wheel_right_joint"])
 
 
 def test_messages_that_come_twice_late_and_in_another_order_are_sorted_by_their_stamps(

@@ -8,6 +8,7 @@ import pytest
 from twin.geometry import Array, Pose2
 from twin.live.calibration.dead_reckoning import DELAY, MOUNT, Increments, Wheels, compose, inverse
 from twin.live.calibration.drive_fit import fit_drive
+from twin.live.calibration.estimates import of_motors
 from twin.live.calibration.gyro_fit import fit_gyro
 from twin.live.calibration.latency import fit_latency
 from twin.live.calibration.link import link_of
@@ -146,6 +147,30 @@ def test_a_latency_is_told_whatever_encoders_count() -> None:
     assert fit.latency == pytest.approx(0.08, abs=5e-4)
     assert fit.counted == pytest.approx([0.999, 1.002], abs=1e-4)
     assert fit.explained > 0.999
+
+
+@pytest.mark.parametrize(
+    ("slide", "names"),
+    [(0.0, {"left", "right"}), (4e-4, {"left", "right", "latency"})],
+    ids=["ticks", "slides"],
+)
+def test_intervals_of_latency_and_encoders_are_as_wide_as_the_errors(slide: float, names: set[str]) -> None:
+    model, seen, tick = wheels(), np.arange(0.0, 20.0, 0.04), 2.0 * np.pi / 4096
+    truth = {"left": 0.999, "right": 1.002, "latency": 0.08}
+    errors: dict[str, list[float]] = {name: [] for name in names}
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        sides = {}
+        for name in ("left", "right"):
+            slid = np.cumsum(rng.normal(size=len(seen))) * slide + rng.uniform(0.0, tick)
+            angle = truth[name] * np.interp(seen - truth["latency"], model.time, getattr(model, name)) + slid
+            sides[name] = np.round(angle / tick) * tick
+        for each in of_motors(fit_latency(model, Wheels(time=seen, **sides)), 0.0):
+            if (name := each.name.removeprefix("encoder_")) in names:
+                errors[name].append(abs(each.value - truth[name]) / each.half_width)
+    for found in errors.values():
+        assert np.count_nonzero(np.array(found) < 1.0) >= 87
+        assert max(found) > 0.7
 
 
 def test_the_least_delay_and_the_drift_of_a_clock_are_taken_off() -> None:

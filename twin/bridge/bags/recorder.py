@@ -50,6 +50,8 @@ class Recorder:
         self.config = config or RecorderConfig()
         self.dropped = 0
         """Messages that came while too much waited."""
+        self.counts: Counter[str] = Counter()
+        """Messages written, by topic."""
         self.refused: Counter[str] = Counter()
         """Messages of a second type on a topic, by topic."""
         self._bus = bus
@@ -167,6 +169,7 @@ class Recorder:
             topic = BagTopic(name=sample.topic, **kind._asdict(), qos=qos, definition=text)
             self._writer.add_topic(topic)
         source = sample.source
+        self.counts[sample.topic] += 1
         self._writer.write(
             BagMessage(sample.topic, sample.payload, time_ns, max(0, source.time_ns), source.sequence)
         )

@@ -1,23 +1,28 @@
-"""`twin calibrate`: what a bag of a physical robot says of a scenario's robot."""
+"""`twin calibrate`: what a physical robot, or a bag of it, says of a scenario's robot."""
 
 from __future__ import annotations
 
 import json as json_text
 import logging
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from twin.bridge.wire import DEFAULT_ENDPOINT
 from twin.cli.console import print_json, stderr, stdout
 from twin.cli.option_groups import AsJson, Overrides, Seed, scenario_argument
 
 if TYPE_CHECKING:
     from twin.live.calibration.calibrate import Calibration
     from twin.live.calibration.estimates import Estimate
+    from twin.scenario.schema import Scenario
+
+_HEARD = "what was heard"
 
 
 def calibrate(
@@ -26,8 +31,30 @@ def calibrate(
         scenario_argument(metavar="SCENARIO", help="Of the robot's model in its world: a name, or a file."),
     ],
     bag: Annotated[
-        Path, typer.Argument(metavar="BAG", help="Folder of a bag, or a .mcap, .db3 or .bag file.")
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="BAG", help="Folder of a bag, or a .mcap, .db3 or .bag file.", show_default=False
+        ),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Listen to a robot that is on the graph, instead of a bag.")
+    ] = False,
+    duration: Annotated[
+        float, typer.Option("--for", metavar="SECONDS", help="How long to listen; Ctrl-C ends it before.")
+    ] = 60.0,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Where the physical robot is, or a router.",
+            show_default=f"{DEFAULT_ENDPOINT}, this computer",
+        ),
+    ] = None,
+    domain: Annotated[int, typer.Option(envvar="ROS_DOMAIN_ID", min=0, max=232, help="ROS domain.")] = 0,
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Keep what is heard, as a bag.", show_default="none"),
+    ] = None,
     robot: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Which of the scenario's robots.", show_default="the only one"),
@@ -42,28 +69,93 @@ def calibrate(
     ] = None,
     json: AsJson = False,
 ) -> None:
-    """Estimate wheels, delays and sensors of a physical robot from a bag, and patch the scenario.
+    """Estimate wheels, delays and sensors of a physical robot, from a bag or live, and patch the scenario.
 
     Each number has a 95 % interval, or the reason why the bag does not tell it. The last third of the bag is
-    held out, to compare what the scenario predicts before and after the patch.
+    held out, to compare what the scenario predicts before and after the patch. A robot that is listened to
+    is driven by whoever commands it; nothing is said to it.
     """
+    if live == (bag is not None):
+        raise typer.BadParameter("a bag, or --live instead of it", param_hint="BAG")
+    if record is not None and not live:
+        raise typer.BadParameter(
+            "only --live records; what it is given already is a bag", param_hint="--record"
+        )
     from twin.cli.run.options import parse_overrides
     from twin.experiments.shrink import as_file
     from twin.files.writing import check_file
+    from twin.live.calibration.calibrate import LEAST_S
     from twin.live.calibration.calibrate import calibrate as calibrated
     from twin.scenario.schema import load
 
+    if not duration >= (least := LEAST_S + 1.0):
+        raise typer.BadParameter(f"{duration:g}: must be at least {least:g} s", param_hint="--for")
     if output is not None:
         check_file(output)
     described = load(scenario, parse_overrides(set or (), seed), execute=True)
-    with stderr().status(f"{bag}: where were its scans made?"), _silent_faults():
-        found = calibrated(described, bag, robot)
+    with ExitStack() as ending:
+        called = str(record or bag or _HEARD)
+        if bag is None:
+            folder = record or Path(ending.enter_context(TemporaryDirectory())) / "bag"
+            _listen(described, robot, connect, domain, folder, duration)
+            bag = folder
+        ending.enter_context(stderr().status(f"{called}: where were its scans made?"))
+        ending.enter_context(_silent_faults())
+        found = calibrated(described, bag, robot, called)
     if output is not None:
-        as_file.write(found.scenario.source, output, [f"Calibrated by {bag}."])
+        as_file.write(found.scenario.source, output, [f"Calibrated by {called}."])
     if json:
         print_json(_values(found))
     else:
         _report(found, output)
+
+
+def _listen(
+    scenario: Scenario,
+    robot: str | None,
+    connect: list[str] | None,
+    domain: int,
+    folder: Path,
+    seconds: float,
+) -> None:
+    """Write a bag of a robot that is on the graph."""
+    from twin.bridge import live
+    from twin.bridge.bags.recorder import Recorder, RecorderConfig
+    from twin.bridge.bags.topic_choice import TopicChoice
+    from twin.bridge.wire.interrupts import noted_signals
+    from twin.live.calibration.calibrate import needed_topics
+    from twin.live.calibration.listening import Listening
+
+    names = needed_topics(scenario, robot)
+    config = RecorderConfig(topics=TopicChoice(topics=tuple(names.values())))
+    with live.join(connect, domain_id=domain) as process, noted_signals() as received, _shown() as show:
+        recorder = Recorder(process.bus, folder, config)
+        with Listening(process.bus, names, recorder, seconds) as listening:
+            while not (received or listening.is_over):
+                process.spin_once()
+                listening.update()
+                show(listening.heard_s, listening.lacks)
+
+
+@contextmanager
+def _shown() -> Iterator[Callable[[float, str], None]]:
+    """Yield what shows for how long something was heard [s] and what it lacks.
+
+    It is a line that stays, or, where no terminal is, a line whenever what is lacking is something else.
+    """
+    console, told = stderr(), None
+    with console.status("") as status:
+
+        def show(heard_s: float, lacks: str) -> None:
+            nonlocal told
+            text = f"{heard_s:.0f} s heard: {lacks or 'enough; more makes it surer'}"
+            if console.is_terminal:
+                status.update(text)
+            elif lacks != told:
+                told = lacks
+                typer.echo(text, err=True)
+
+        yield show
 
 
 @contextmanager

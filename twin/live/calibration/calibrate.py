@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import product
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,11 @@ from twin.live.calibration.expected_scan import ExpectedScan
 from twin.live.calibration.gyro_fit import GyroFit, fit_gyro
 from twin.live.calibration.latency import fit_latency
 from twin.live.calibration.prediction import HARDWARE, Predicted, hardware_alone, predict
-from twin.live.calibration.recorded import read
+from twin.live.calibration.recorded import SCAN, read, topics_of
 from twin.live.calibration.scan_pose import ScanPose, first_pose, locate
 from twin.models.description import RobotDescription
 from twin.models.kinematics import link_poses
+from twin.nodes.diff_drive_controller import DiffDriveControllerNode
 from twin.runtime.open_run import OpenRun
 from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.faults import FaultEntry
@@ -43,6 +46,9 @@ _LEAD_S = 2.0
 _MOST_SCANS = 600
 _OFFSETS = (0.0, -0.3, 0.3)
 _TURNS = (0.0, -0.25, 0.25)
+_DOUBT = 2.0
+"""A robot whose odometry goes on from an earlier drive is where the scenario starts it only if that fits so
+much better: seen from the other side, rooms look alike."""
 _LEAST_SHARE, _WORST_SIGMA_M = 0.5, 0.1
 """Of a scan that fits the scenario's world."""
 _COMPARED_SCANS = 60
@@ -80,28 +86,64 @@ class Calibration:
     """What a user should know, one sentence each."""
 
 
-def calibrate(scenario: Scenario, bag: Path, robot: str | None = None) -> Calibration:
+def calibrate(scenario: Scenario, bag: Path, robot: str | None = None, called: str = "") -> Calibration:
     """Return what a bag tells.
 
     Args:
         scenario: Of the robot: its file, its world, where it starts.
         bag: Recorded beside the robot, which drove around in that world.
         robot: Which of the scenario's robots; None: the only one.
+        called: What the bag is in messages; empty: its path.
 
     Raises:
         RecordingError: The bag cannot be used.
         ScenarioError: The scenario's robot cannot be calibrated.
     """
+    with _believed(scenario, robot) as model:
+        return _Evidence(scenario, model, bag, called or str(bag)).calibration()
+
+
+def needed_topics(scenario: Scenario, robot: str | None = None) -> dict[str, str]:
+    """Return the topics of which `calibrate` needs the messages, by what they are, as `topics_of`.
+
+    Raises:
+        ScenarioError: The scenario's robot cannot be calibrated.
+    """
+    with _believed(scenario, robot) as model:
+        return model.topics
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Model:
+    """The scenario's robot as it is believed to be."""
+
+    opened: OpenRun
+    stack: RobotStack
+    drive: DiffDriveControllerNode
+    lidar: Lidar
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Of the physical robot, by what they are."""
+        return topics_of(self.stack.context.namespace, self.lidar.spec.topic)
+
+
+@contextmanager
+def _believed(scenario: Scenario, robot: str | None) -> Iterator[_Model]:
     name = _chosen(scenario, robot)
-    believed = OpenRun(
+    opened = OpenRun(
         hardware_alone(scenario.model_copy(update={"faults": ()})), record=False, layout=HARDWARE
     )
     try:
-        stack = believed.run.parts.stacks[name]
-        found = _Evidence(scenario, stack, believed, bag)
-        return found.calibration()
+        stack = opened.run.parts.stacks[name]
+        lidars = [each for each in stack.handle.sensors if isinstance(each, Lidar)]
+        if stack.drive is None:
+            raise ScenarioError(f"robot '{name}' has no differential drive; no other can be calibrated")
+        if not lidars:
+            raise ScenarioError(f"robot '{name}' has no lidar by which its way could be measured")
+        yield _Model(opened=opened, stack=stack, drive=stack.drive, lidar=lidars[0])
     finally:
-        believed.close()
+        opened.close()
 
 
 def _chosen(scenario: Scenario, robot: str | None) -> str:
@@ -116,33 +158,30 @@ def _chosen(scenario: Scenario, robot: str | None) -> str:
 class _Evidence:
     """A bag, and where in the scenario's world its scans were made."""
 
-    def __init__(self, scenario: Scenario, stack: RobotStack, believed: OpenRun, bag: Path) -> None:
-        self.scenario, self.stack, self.bag = scenario, stack, bag
-        lidars = [each for each in stack.handle.sensors if isinstance(each, Lidar)]
-        if stack.drive is None:
-            raise ScenarioError(f"robot '{stack.name}' has no differential drive; no other can be calibrated")
-        if not lidars:
-            raise ScenarioError(f"robot '{stack.name}' has no lidar by which its way could be measured")
-        self.config = stack.drive.config
-        self.period = believed.run.parts.control_period_ns * 1e-9
+    def __init__(self, scenario: Scenario, model: _Model, bag: Path, called: str) -> None:
+        self.scenario, self.stack, self.bag = scenario, model.stack, called
+        stack, run = model.stack, model.opened.run
+        self.config = model.drive.config
+        self.period = run.parts.control_period_ns * 1e-9
         self.recorded = read(
             bag,
-            stack.context.namespace,
+            model.topics,
             self.config.left_joints,
             self.config.right_joints,
-            lidars[0].spec.topic,
+            odom_frame=stack.frames.odom,
+            called=called,
         )
         # A controller that is late, as its odometry usually is, has heard of more.
         self.commands = self.recorded.commands - [self.recorded.link.usual, 0.0, 0.0]
-        self._check(lidars[0])
-        self.expected = ExpectedScan(believed.run.world, stack.handle, lidars[0])
+        self._check(model.lidar)
+        self.expected = ExpectedScan(run.world, stack.handle, model.lidar)
         self.axle = _axle(stack.handle.description)
         self.time, self.ranges = self._scans()
         self.end = float(self.recorded.wheels.time[-1])
         self.split = float(self.recorded.wheels.time[0]) + TRAINED * (
             self.end - float(self.recorded.wheels.time[0])
         )
-        self.track = stack.drive.controller.track
+        self.track = model.drive.controller.track
         self.start = np.array([1.0, 0.0, 1.0, 0.0, 0.0, *(self.axle.inverse() @ self.expected.mount), 0.0])
         self.notices = list(self.recorded.notices)
         self.places = self._places()
@@ -155,7 +194,7 @@ class _Evidence:
                 f"{self.bag}: holds {seconds:.1f} s of the wheels; at least {LEAST_S:g} s are needed"
             )
         if scans is None:
-            topic = f"{self.stack.context.namespace}/{spec.topic}"
+            topic = topics_of(self.stack.context.namespace, spec.topic)[SCAN]
             raise RecordingError(f"{self.bag}: has no scans on {topic} to measure the robot's way by")
         step = (spec.angle_max - spec.angle_min) / max(1, spec.samples - 1)
         first, given, count = scans.angles
@@ -178,11 +217,9 @@ class _Evidence:
 
     def _places(self) -> list[ScanPose | None]:
         """Return where each scan was made; None where it does not fit."""
-        first = self.stack.context.start @ self.expected.mount
-        starts = [first @ Pose2(x, y, yaw) for x, y, yaw in product(_OFFSETS, _OFFSETS, _TURNS)]
         increments = Increments(self.recorded.wheels, self.time, self.config.drive.wheel_radius, self.track)
         motions = increments.lidar(self.start)
-        found: list[ScanPose | None] = [_fitting(first_pose(self.ranges[0], self.expected, starts))]
+        found: list[ScanPose | None] = [self._first_place()]
         if found[0] is None:
             raise RecordingError(
                 f"{self.bag}: its first scan does not fit what '{self.stack.name}' sees where the scenario "
@@ -204,6 +241,19 @@ class _Evidence:
                 f"{lost} of {len(found)} scans do not fit the scenario's world and were left out"
             )
         return found
+
+    def _first_place(self) -> ScanPose | None:
+        """Return where the first scan was made; the robot may have driven before."""
+        start, recorded = self.stack.context.start, self.recorded
+        T_map_odom = start if recorded.T_map_odom is None else recorded.T_map_odom
+        found = []
+        for guess, doubt in ((T_map_odom @ recorded.began, 1.0), (start, _DOUBT)):
+            near = guess @ self.expected.mount
+            starts = [near @ Pose2(x, y, yaw) for x, y, yaw in product(_OFFSETS, _OFFSETS, _TURNS)]
+            place = _fitting(first_pose(self.ranges[0], self.expected, starts))
+            if place is not None:
+                found.append((doubt * place.misfit, place))
+        return min(found, key=itemgetter(0))[1] if found else None
 
     def calibration(self) -> Calibration:
         """Estimate, patch, compare."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from twin.geometry import Array
 from twin.live.calibration.dead_reckoning import PARAMETERS
@@ -111,13 +112,15 @@ def of_motors(fit: LatencyFit, doubt: float) -> Iterator[Estimate]:
     The latency is how much later they move, as the recorder hears it; an encoder counts so much of the angle
     by which its motor should turn. `doubt`: what is not known of the latency besides [s].
     """
+    # Of few windows: Student's.
+    within = float(stdtrit(fit.freedom, 0.975))
     other = "" if fit.explained >= _FOLLOWS else "the wheels do not follow the commands as the model's do"
     for side, count, deviation in zip(("left", "right"), fit.counted, fit.counted_stddev, strict=True):
         yield Estimate(
             name=f"encoder_{side}",
             unit="1",
             value=float(count),
-            half_width=_95 * float(deviation),
+            half_width=within * float(deviation),
             believed=1.0,
             not_observable=other,
         )
@@ -125,7 +128,7 @@ def of_motors(fit: LatencyFit, doubt: float) -> Iterator[Estimate]:
         name="latency",
         unit="s",
         value=fit.latency,
-        half_width=_95 * fit.stddev + doubt,
+        half_width=within * fit.stddev + doubt,
         believed=0.0,
         not_observable=other or ("the commands hardly changed" if fit.stddev > 0.05 else ""),
     )

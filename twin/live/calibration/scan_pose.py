@@ -43,6 +43,11 @@ class ScanPose(NamedTuple):
     share: float
     """Of the rays that returned: how many fit."""
 
+    @property
+    def misfit(self) -> float:
+        """Less is better [m]."""
+        return self.sigma / max(self.share, 1e-3)
+
 
 def locate(ranges: Array, expected: Callable[[Pose2], View], start: Pose2) -> ScanPose | None:
     """Return where a scan was made, by Gauss-Newton on the ranges; None where it does not fit.
@@ -78,4 +83,4 @@ def locate(ranges: Array, expected: Callable[[Pose2], View], start: Pose2) -> Sc
 def first_pose(ranges: Array, expected: Callable[[Pose2], View], starts: Iterable[Pose2]) -> ScanPose | None:
     """Return the best of what `locate` finds from several starts."""
     found = [place for start in starts if (place := locate(ranges, expected, start)) is not None]
-    return min(found, key=lambda place: place.sigma / max(place.share, 1e-3), default=None)
+    return min(found, key=lambda place: place.misfit, default=None)
