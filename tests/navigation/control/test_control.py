@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.control.goal_checker import GoalCheckerConfig, SimpleGoalChecker
 from twin.navigation.control.progress_checker import SimpleProgressChecker
@@ -24,6 +25,8 @@ from twin.navigation.recovery import (
     Spin,
     Wait,
 )
+from twin.runtime.defaults.controllers import controller_server_config
+from twin.scenario.controllers import ControllerParameters
 
 DT = 0.05
 
@@ -115,6 +118,32 @@ def test_a_path_behind_is_turned_to_within_the_acceleration_limit() -> None:
     assert np.abs(np.diff(np.concatenate([[0.0], turning[:10, 1]]))).max() <= 3.2 * DT + 1e-9
     assert np.abs(commands[:, 1]).max() <= 1.8
     assert poses[-1, 0] > 0.2
+
+
+@pytest.mark.parametrize("late", [0, 2, 4])
+@pytest.mark.parametrize("heading", [1.0, 1.8, -1.4, -3.0])
+def test_a_base_that_speeds_up_slowly_and_lags_does_not_turn_past_the_path(heading: float, late: int) -> None:
+    """As behind a velocity smoother, whose commands come to the wheels that many periods later."""
+    smoother, path, dt = VelocitySmootherConfig(), line(12.0), 0.06
+    config = controller_server_config(ControllerParameters(), smoother).controllers["FollowPath"]
+    controller = RegulatedPurePursuit(config=config, footprint=rectangle(0.4, 0.3))
+    pose, actual, under_way = Pose2(0.0, 0.0, heading), (0.0, 0.0), [(0.0, 0.0)] * late
+    driven, past = False, 0.0
+    for _ in range(120):
+        command = controller.compute_velocity(pose, actual, path, None, dt)
+        assert not (driven and command[0] == 0.0), "it stops to turn back"
+        driven = command[0] > 0.0
+        under_way.append(command)
+        v, w = under_way.pop(0)
+        most_v, most_w = 0.8 * dt, 2.0 * dt
+        actual = (
+            actual[0] + min(max(v - actual[0], -most_v), most_v),
+            actual[1] + min(max(w - actual[1], -most_w), most_w),
+        )
+        pose = move(pose, *actual, dt)
+        past = max(past, -math.copysign(1.0, heading) * pose.yaw) if driven else past
+    assert past < 0.35
+    assert abs(pose.y) < 0.1
 
 
 def test_the_goals_heading_is_reached_by_turning_at_the_goal() -> None:

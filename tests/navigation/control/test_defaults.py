@@ -64,7 +64,12 @@ MPPI, DWB = MPPIConfig(), DWBConfig()
         ("progress checker", PoseProgressCheckerConfig(), 3, {}),
         ("collision monitor", FOOTPRINT_APPROACH, 7, {"min_points": 3}),
         ("path handler", MPPI, 4, {"prune_distance": 1.5, "enforce_path_inversion": True}),
-        ("regulated pure pursuit", RegulatedPurePursuitConfig(), 27, {"max_linear_decel": 0.0}),
+        (
+            "regulated pure pursuit",
+            RegulatedPurePursuitConfig(),
+            28,
+            {"max_linear_accel": 0.0, "max_linear_decel": 0.0},
+        ),
         ("rotation shim", RotationShimConfig(), 9, {}),
     ],
 )

@@ -133,6 +133,7 @@ def _pure_pursuit(smoother: VelocitySmootherConfig, tolerance: float) -> Regulat
         approach_velocity_scaling_dist=0.8,
         xy_goal_tolerance=tolerance,
         max_linear_decel=smoother.linear.braking,
+        max_linear_accel=smoother.linear.max_acceleration,
         cost_scaling_dist=0.7,
     )
 

@@ -92,5 +92,8 @@ class RegulatedPurePursuitConfig:
     """Shortest way that is checked for collisions, also where it takes longer; negative: none."""
     max_linear_decel: Annotated[MetresPerSecondSquared, NotNegative] = 0.0
     """Of the robot: the way to a stop from the present speed is always checked; 0: it is not."""
+    max_linear_accel: Annotated[MetresPerSecondSquared, NotNegative] = 0.0
+    """Of the robot: it is commanded no faster than it can be after its reaction time, and so turns along the
+    arc while it speeds up, not past it; 0: any speed may be commanded at once."""
     reaction_time: Annotated[Seconds, NotNegative] = 0.3
     """Part of the way to a stop: age of what the costmap shows, and a command's way to the wheels."""

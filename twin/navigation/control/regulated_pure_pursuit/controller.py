@@ -86,7 +86,7 @@ class RegulatedPurePursuit(Controller):
         turn = self._turn_in_place(now, ahead, math.hypot(*local[-1]), bearing)
         if turn is None:
             curvature = 2.0 * y / (x * x + y * y) if x * x + y * y > 0.001 else 0.0
-            v = sign * self._regulate(now, curvature, local, ahead.length)
+            v = sign * min(self._regulate(now, curvature, local, ahead.length), self._reachable(now, sign))
             if self._cancelling and config.use_cancel_deceleration:
                 v = sign * max(0.0, sign * now.velocity[0] - config.cancel_deceleration * now.dt)
             w = v * curvature
@@ -140,6 +140,13 @@ class RegulatedPurePursuit(Controller):
             max_rate=self.config.rotate_to_heading_angular_vel,
             acceleration=self.config.max_angular_accel,
         )
+
+    def _reachable(self, now: Situation, sign: float) -> float:
+        """Return the speed that the robot can have when a command gets to its wheels [m/s]."""
+        config = self.config
+        if not config.max_linear_accel:
+            return math.inf
+        return max(0.0, sign * now.velocity[0]) + config.max_linear_accel * (config.reaction_time + now.dt)
 
     def _regulate(self, now: Situation, curvature: float, local: Array, length: float) -> float:
         """Return the linear velocity: slower in turns, near obstacles and at the end."""
