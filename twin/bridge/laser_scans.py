@@ -44,10 +44,10 @@ class SliceConfig:
     """[m]"""
 
     def __post_init__(self) -> None:
-        if not 0.0 < (self.angle_max - self.angle_min) / self.angle_increment <= _MOST_RAYS:
+        low, high, step = self.angle_min, self.angle_max, self.angle_increment
+        if not (step > 0.0 and 0.0 < (high - low) / step <= _MOST_RAYS):
             raise BridgeError(
-                f"from {self.angle_min:g} to {self.angle_max:g} rad by {self.angle_increment:g} rad is no scan; "
-                f"valid are 1 to {_MOST_RAYS} rays"
+                f"from {low:g} to {high:g} rad by {step:g} rad is no scan; valid are 1 to {_MOST_RAYS} rays"
             )
 
 
