@@ -23,13 +23,13 @@ def make_points(values: Any, fields: Sequence[str] = XYZ, dtype: DTypeLike = np.
     Raises:
         CloudError: There are more or fewer columns than fields.
     """
-    values = np.asarray(values, dtype=dtype).reshape(len(values), -1)
-    if len(values) and values.shape[1] != len(fields):
+    values = np.asarray(values, dtype=dtype).reshape(len(values), -1 if len(values) else len(fields))
+    if values.shape[1] != len(fields):
         raise CloudError(
             f"{values.shape[1]} numbers for each point; valid is {len(fields)}: {', '.join(fields)}"
         )
     points = np.zeros(len(values), [(name, values.dtype) for name in fields])
-    for column, name in enumerate(fields if len(values) else ()):
+    for column, name in enumerate(fields):
         points[name] = values[:, column]
     return points
 

@@ -91,7 +91,7 @@ class Source:
             i = _first_fault(texts, flat)
             names = shortened(dtype.names or ())
             raise self.fault(
-                f"is '{shown(texts[i])}'; valid are {len(kinds)} numbers: {names}", first_line + at[i]
+                f"is '{shown(texts[i])}'; valid are numbers for {names}", first_line + at[i]
             ) from None
         return table.view(dtype) if dtype.itemsize == flat.itemsize else _regrouped(table, dtype)
 
@@ -138,11 +138,7 @@ def text_of(points: Points) -> bytes:
     """Return a line for each point, with as few digits as lead back to the same numbers."""
     flat = packed(points).reshape(-1)
     columns: list[NDArray[np.str_]] = []
-    for name, _ in scalar_fields(flat.dtype):
-        columns += [_texts(values) for values in flat[name].reshape(len(flat), -1).T]
+    for name, kind in scalar_fields(flat.dtype):
+        columns += [values.astype(np.str_) for values in flat[name].reshape(len(flat), _numbers(kind)).T]
     lines: Iterable[tuple[str, ...]] = zip(*columns, strict=True)
     return "".join(f"{' '.join(line)}\n" for line in lines).encode()
-
-
-def _texts(values: NDArray[Any]) -> NDArray[np.str_]:
-    return values.astype(np.str_)
