@@ -111,19 +111,17 @@ class MultiLayerLidar(Sensor):
         """Read `<ray>` or `<lidar>` with `<vertical>`; without it there is one level layer."""
         across, upwards = (ray_child(element, f"scan/{way}") for way in ("horizontal", "vertical"))
         columns = required_number(element, across, "samples", report)
-        layers = 1.0 if upwards is None else required_number(element, upwards, "samples", report)
-        if (
-            columns != int(columns)
-            or layers != int(layers)
-            or not 1 <= min(columns, layers) <= columns * layers <= MAX_RAYS
-        ):
+        low, high = (required_number(element, across, f"{end}_angle", report) for end in ("min", "max"))
+        layers, down, up = 1.0, 0.0, 0.0
+        if upwards is not None:  # with SDFormat's defaults
+            layers, down, up = (
+                report.child_number(upwards, name) or default
+                for name, default in (("samples", 1.0), ("min_angle", 0.0), ("max_angle", 0.0))
+            )
+        if min(columns, layers) < 1 or columns * layers > MAX_RAYS or columns % 1 or layers % 1:
             valid = f"whole numbers, whose product is at most {MAX_RAYS}"
             add_fault(report, element, f" has {columns:g} x {layers:g} samples; valid are {valid}")
             columns = layers = 1.0
-        low, high = (required_number(element, across, f"{end}_angle", report) for end in ("min", "max"))
-        down = up = 0.0
-        if upwards is not None:
-            down, up = (required_number(element, upwards, f"{end}_angle", report) for end in ("min", "max"))
         if low > high or down > up:
             add_fault(report, element, ": min_angle is above max_angle")
         range_min, range_max = read_reach(element, report)

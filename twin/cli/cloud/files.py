@@ -67,15 +67,16 @@ def crop(
     source: Source,
     output: Output,
     low: Annotated[
-        str, typer.Option("--min", metavar="X,Y,Z", help="Least x, y, z.", show_default="no limit")
+        str, typer.Option("--min", metavar="X,Y,Z", help="Least x, y, z in metres.", show_default="no limit")
     ] = "",
     high: Annotated[
-        str, typer.Option("--max", metavar="X,Y,Z", help="Largest x, y, z.", show_default="no limit")
+        str,
+        typer.Option("--max", metavar="X,Y,Z", help="Largest x, y, z in metres.", show_default="no limit"),
     ] = "",
     negative: Annotated[bool, typer.Option("--negative", help="Keep what is outside of the box.")] = False,
     encoding: Encoding = "binary",
 ) -> None:
-    """Keep the points in a box [m]."""
+    """Keep the points in a box."""
     from twin.clouds.filters import crop_box
 
     corners = _corner("--min", low, -math.inf), _corner("--max", high, math.inf)
