@@ -46,6 +46,7 @@ SLOW = {
     "docs/navigation.md",
     "docs/arenas.md",
     "docs/ros/commands.md",
+    "docs/ros/clouds.md",
 }
 """Pages whose commands take longer than some seconds."""
 

@@ -5,6 +5,7 @@ TwinError
 ├── ConversionError   a robot description has no faithful MuJoCo model
 ├── ScenarioError     a scenario or arena file is wrong
 ├── MapError          a map file is wrong
+├── CloudError        a file of points is wrong, or points lack what is to be done with them
 ├── NavigationError   a behaviour tree or a file of Nav2 parameters is wrong
 ├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
 ├── PluginError       a user's plugin lacks something, cannot be found, or fails while it runs
@@ -95,6 +96,10 @@ class ScenarioError(TwinError):
 
 class MapError(TwinError):
     """A map file is wrong."""
+
+
+class CloudError(TwinError):
+    """A file of points is wrong, or points lack what is to be done with them."""
 
 
 class NavigationError(TwinError):

@@ -41,6 +41,8 @@ _left: list[Any] = []
 """What Zenoh made in the process of which this one is a fork."""
 
 Tap = Callable[[Sample[Any]], None]
+Demand = Callable[[str, str], bool]
+"""Whether a topic with messages of a type is wanted."""
 
 
 class Bus:
@@ -69,6 +71,7 @@ class Bus:
         self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.demands: list[tuple[Tap, Demand]] = []
         self.arrival_taps: list[Callable[[Arrival], None]] = []
         """Called for everything from outside when it enters, before a node has it."""
         self.incoming: Callable[[str, Any], None] | None = None
@@ -284,8 +287,19 @@ class Bus:
         self._put_offs.append((receiver, data))
 
     def tap(self, callback: Tap) -> None:
-        """Call back for every sample that this process publishes, while it publishes it."""
+        """Call back for every sample that this process publishes, while it publishes it.
+
+        What is published on demand (`Publisher.on_demand`) is left out: to hear of it changes what there is.
+        """
         self.taps.append(callback)
+
+    def demand(self, callback: Tap, wants: Demand) -> None:
+        """Have topics published that are published on demand only, and call back for their samples."""
+        self.demands.append((callback, wants))
+
+    def demanding(self, topic: str, msgtype: str) -> list[Tap]:
+        """Return who demands a topic."""
+        return [callback for callback, wants in self.demands if wants(topic, msgtype)]
 
     def go_alone(self) -> None:
         """Be, in a fork, a bus without a network: what Zenoh made is kept, and never touched again.

@@ -38,9 +38,12 @@ class SensorPublisher:
         self._publisher: Publisher[Any] = self.node.create_publisher(
             kind.message, sensor.spec.topic, SENSOR_DATA
         )
+        self._publisher.on_demand = self._on_demand = kind.on_demand
 
     def publish(self, time_ns: int) -> None:
         """Sample at `time_ns` and publish, stamped with it; a sensor that fails may have nothing to say."""
+        if self._on_demand and not self._publisher.is_wanted:
+            return
         if (
             self._plugin.ships
         ):  # and needs no guard; a user's may say the same object again, with other values

@@ -146,7 +146,8 @@ class OpenRun:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
+        show = None if self._sink is None else shown(self._sink)
+        taps = [*taps, *(() if show is None else (show,))]
         taps += [] if bag_tap is None else [bag_tap.on_sample]
         self._observers = taps
         network = network or SessionConfig(listen=outside.endpoints(listen))
@@ -165,7 +166,11 @@ class OpenRun:
                 layout=layout,
             )
             ending.callback(parts.bus.close)
+            if show is not None and self._sink is not None:
+                sink = self._sink
+                parts.bus.demand(show, lambda topic, msgtype: sink.shows(msgtype))
             if bag_tap is not None:
+                parts.bus.demand(bag_tap.on_sample, lambda topic, msgtype: True)
                 ending.callback(bag_tap.close)
                 parts.bus.arrival_taps.append(bag_tap.on_arrival)
             if self._sink is not None:
@@ -304,6 +309,7 @@ class OpenRun:
         self.run.go_alone()
         bus = self.run.bus
         bus.taps[:] = [tap for tap in bus.taps if tap not in self._observers]
+        bus.demands[:] = [each for each in bus.demands if each[0] not in self._observers]
         _left.append((self._ending.pop_all(), self._sink, self._observers))
         self._sink = self._pace = self._out = None
         self.run.wait = lambda: None

@@ -15,6 +15,7 @@ from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report, text_of
 from twin.models.urdf.gazebo import number_in
 from twin.models.urdf.sensors import Common, add_fault, required_number
+from twin.sensors.multi_layer_lidar import MultiLayerLidar
 from twin.sensors.range import Range
 from twin.sensors.ray_elements import FATES, MAX_RAYS, add_rangefinders, ray_child, read_noise, read_reach
 from twin.sensors.sensor import Sensor
@@ -70,7 +71,9 @@ class Lidar(Sensor):
 
     @classmethod
     def for_element(cls, element: Element) -> type[Sensor]:
-        """Return a ranger if classic Gazebo's ray sensor is read out as a sensor_msgs/Range."""
+        """Return a ranger or a source of clouds if classic Gazebo's plugin reads it out as such."""
+        if MultiLayerLidar.asks_for_cloud(element):
+            return MultiLayerLidar
         for plugin in element.findall("plugin"):
             if text_of(plugin, "output_type") == "sensor_msgs/Range":
                 return Range
@@ -103,11 +106,22 @@ class Lidar(Sensor):
         )
 
     @classmethod
-    def unlike_gazebo(cls, element: Element) -> Iterator[tuple[str, str]]:
-        """Yield that further layers are missing."""
-        rows = number_in(ray_child(element, "scan/vertical/samples"))
-        if rows is not None and rows > 1:
-            yield f"has {rows:g} layers, of which only a level one is simulated", "twin's lidars are planar"
+    def companions(cls, element: Element, spec: LidarSpec, report: Report) -> Iterator[SensorSpec]:
+        """Yield a source of clouds on `<topic>/points`, as Gazebo has it, if there are several layers.
+
+        The scan is the level one: of several layers, ros_gz_bridge takes the middle one for it.
+        """
+        layers = number_in(ray_child(element, "scan/vertical/samples"))
+        if layers is not None and layers > 1:
+            common: Common = {
+                "name": f"{spec.name}_points",
+                "link": spec.link,
+                "topic": f"{spec.topic}/points",
+                "rate_hz": spec.rate_hz,
+                "T_link_sensor": spec.T_link_sensor,
+                "line": spec.line,
+            }
+            yield MultiLayerLidar.read(element, common, report)
 
     def __init__(self, spec: LidarSpec, mount: Mount) -> None:
         super().__init__(spec, mount)

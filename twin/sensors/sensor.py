@@ -32,6 +32,8 @@ class Sensor(ABC):
     """The field of its message that tells what it measures, if there are several with numbers."""
     at_origin: ClassVar[bool] = True
     """Whether it measures at the origin of its link, wherever its `<pose>` is."""
+    on_demand: ClassVar[bool] = False
+    """Whether it measures only if somebody wants its messages, which then are not in the digest of a run."""
     in_mujoco: ClassVar[str] = ""
     """What `to_mujoco` adds, in words; empty: MuJoCo has nothing like it."""
     fates: ClassVar[Mapping[str, Fate]] = MappingProxyType({})
@@ -64,6 +66,11 @@ class Sensor(ABC):
     def for_element(cls, element: Element) -> type[Sensor]:
         """Return the class that a `<sensor>` of its types asks for."""
         return cls
+
+    @classmethod
+    def companions(cls, element: Element, spec: Any, report: Report) -> Iterator[SensorSpec]:
+        """Yield what the same `<sensor>` is besides `spec`, under other names and topics."""
+        return iter(())
 
     @classmethod
     def unlike_gazebo(cls, element: Element) -> Iterator[tuple[str, str]]:

@@ -169,12 +169,6 @@ UNSIMULATED = {
     "name='ignition::gazebo::systems::AckermannSteering'/></gazebo>",
     "p3d": "<gazebo><plugin filename='libgazebo_ros_p3d.so' name='p'/></gazebo>",
     "altimeter": on("a", "<sensor name='s' type='altimeter'/>"),
-    "3D lidar": on(
-        "a",
-        "<sensor name='s' type='gpu_lidar'><lidar><scan><horizontal><samples>2</samples>"
-        "<min_angle>-1</min_angle><max_angle>1</max_angle></horizontal><vertical><samples>16</samples></vertical></scan>"
-        "<range><min>0.1</min><max>8</max></range></lidar></sensor>",
-    ),
     "displaced": on("a", "<sensor name='s' type='imu'><pose>0 0 1 0 0 0</pose></sensor>"),
     "mu2": on("a", "<mu1>1</mu1><mu2>0.1</mu2>"),
     "camera": on("a", f"<sensor name='s' type='camera'>{CAMERA}</sensor>"),

@@ -21,7 +21,6 @@ from twin.bridge.msgs import (
     Path,
     Point,
     PointCloud2,
-    PointField,
     PointStamped,
     Pose,
     PoseArray,
@@ -35,6 +34,8 @@ from twin.bridge.msgs import (
     header,
     ns,
 )
+from twin.bridge.point_cloud2 import create_cloud, fields_of, points_in
+from twin.clouds.points import XYZ
 from twin.errors import BridgeError, nearest, shortened
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz, multiply_wxyz, rotate_wxyz
 
@@ -122,10 +123,6 @@ _FUNCTIONS: dict[type, Callable[[Any, Pose3, Header], Any]] = {
 }
 
 
-_FLOATS = {7: "f4", 8: "f8"}
-"""PointField.FLOAT32 and FLOAT64."""
-
-
 def moved(cloud: PointCloud2, T_target_source: Pose3) -> PointCloud2:
     """Return a cloud with its x, y, z moved and all other fields kept; normals are not turned, as in tf2.
 
@@ -144,40 +141,17 @@ def moved(cloud: PointCloud2, T_target_source: Pose3) -> PointCloud2:
 
 def _coordinates(cloud: PointCloud2, data: np.ndarray) -> list[np.ndarray]:
     """Return x, y, z as views of the data, shape (height, width)."""
-    if cloud.row_step < cloud.width * cloud.point_step or len(data) < cloud.height * cloud.row_step:
-        raise BridgeError(
-            f"the cloud has {len(data)} bytes; {cloud.height} rows of {cloud.width} points of "
-            f"{cloud.point_step} bytes, {cloud.row_step} a row, need more"
-        )
-    order = ">" if cloud.is_bigendian else "<"
-    layout = {field.name: field for field in cloud.fields}
-    views = []
-    for name in "xyz":
-        field = layout.get(name)
-        kind = None if field is None else _FLOATS.get(field.datatype)
-        if field is None or kind is None:
-            names = shortened([f.name for f in cloud.fields]) or "none"
-            raise BridgeError(f"the cloud has no floating-point field {name!r}; its fields: {names}")
-        dtype = np.dtype(order + kind)
-        if field.offset + dtype.itemsize > cloud.point_step:
-            raise BridgeError(f"the field {name!r} ends after the point's {cloud.point_step} bytes")
-        if not cloud.width or not cloud.height:
-            views.append(np.empty((cloud.height, cloud.width), dtype))
-            continue
-        views.append(
-            np.ndarray(
-                (cloud.height, cloud.width),
-                dtype,
-                data.data,
-                field.offset,
-                (cloud.row_step, cloud.point_step),
+    points = points_in(cloud, data)
+    names = points.dtype.names or ()
+    for name in XYZ:
+        if name not in names or points.dtype[name].kind != "f":
+            raise BridgeError(
+                f"the cloud has no floating-point field {name!r}; its fields: {shortened(names) or 'none'}"
             )
-        )
-    return views
+    return [points[name] for name in XYZ]
 
 
 Indices = NDArray[np.intp]
-_INT32, _FLOAT32 = 5, 7
 
 
 def project_laser(scan: LaserScan, *, range_cutoff: float = -1.0) -> PointCloud2:
@@ -253,22 +227,7 @@ def _cloud(scan: LaserScan, frame: str, kept: Indices, points: Array) -> PointCl
     if len(scan.intensities):
         columns.append(("intensity", "<f4", np.asarray(scan.intensities)[kept]))
     columns.append(("index", "<i4", kept))
-    packed = np.zeros(len(kept), dtype=[(name, kind) for name, kind, _ in columns])
+    points_of_rays = np.zeros(len(kept), dtype=[(name, kind) for name, kind, _ in columns])
     for name, _, values in columns:
-        packed[name] = values
-    step = packed.dtype.itemsize
-    fields = [
-        PointField(name, 4 * place, _INT32 if kind == "<i4" else _FLOAT32, 1)
-        for place, (name, kind, _) in enumerate(columns)
-    ]
-    return PointCloud2(
-        header=header(ns(scan.header.stamp), frame),
-        height=1,
-        width=len(kept),
-        fields=fields,
-        is_bigendian=False,
-        point_step=step,
-        row_step=step * len(kept),
-        data=np.frombuffer(packed.tobytes(), dtype=np.uint8),
-        is_dense=False,
-    )
+        points_of_rays[name] = values
+    return create_cloud(header(ns(scan.header.stamp), frame), fields_of(points_of_rays.dtype), points_of_rays)

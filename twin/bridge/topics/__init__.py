@@ -111,8 +111,15 @@ class Publisher(Endpoint, Generic[M]):
         self._retained = deque[Sample[M]](maxlen=min(qos.depth, _KEEP_ALL))
         if self._latched and self._listeners is not None:
             self._listeners.latched.append(self)
+        self.on_demand = False
+        """Whether it publishes only if somebody wants it; then taps are shown it that demand it."""
         self._declared.append(self._zenoh)
         self.announce()
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether somebody listens, or demands the topic (`Bus.demand`)."""
+        return self.has_subscribers or bool(self._bus.demanding(self.name, self.msgtype))
 
     @property
     def has_subscribers(self) -> bool:
@@ -168,11 +175,12 @@ class Publisher(Endpoint, Generic[M]):
         receivers = None
         if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
             receivers = listeners.receivers
+        taps = bus.demanding(self.name, self.msgtype) if self.on_demand else bus.taps
         latched = self._latched and (receivers is not None or listeners is None)  # Zenoh's: for a fork
         # What stays as it is, and nobody is given, need not be settled.
-        if receivers or latched or (bus.taps and not frozen):
+        if receivers or latched or (taps and not frozen):
             sample.settle(frozen)
-        for tap in bus.taps:
+        for tap in taps:
             tap(sample)
         if latched:
             self._retained.append(sample)
@@ -180,7 +188,7 @@ class Publisher(Endpoint, Generic[M]):
             for receiver in receivers:
                 bus.deliver(receiver, sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
-        elif bus.taps or self.has_subscribers:
+        elif taps or self.has_subscribers:
             self._put(sample)
 
     def relay(self, sequence: int, time_ns: int, payload: bytes) -> None:

@@ -135,12 +135,12 @@ def read_sensors(
         plugin = _plugin_for(element, options)
         if plugin is None:
             continue
-        sensor = _read_sensor(element, link, report, plugin)
-        if any((sensor.name, sensor.link) == (other.name, other.link) for other in sensors):
-            message = f"sensor '{sensor.name}' is defined twice; names are unique"
-            report.add(element, message, code="bad-sensor")
-        name = unique_name(sensor.name, link, [other.name for other in sensors])
-        sensors.append(replace(sensor, name=name))
+        for sensor in _read_sensor(element, link, report, plugin):
+            if any((sensor.name, sensor.link) == (other.name, other.link) for other in sensors):
+                message = f"sensor '{sensor.name}' is defined twice; names are unique"
+                report.add(element, message, code="bad-sensor")
+            name = unique_name(sensor.name, link, [other.name for other in sensors])
+            sensors.append(replace(sensor, name=name))
     return tuple(sensors)
 
 
@@ -182,14 +182,17 @@ def _plugin_for(element: Element, options: ReadOptions) -> Plugin[Any] | None:
     return plugin if plugin.ships or options.execute else None
 
 
-def _read_sensor(element: Element, link: str, report: Report, plugin: Plugin[Any]) -> SensorSpec:
+def _read_sensor(element: Element, link: str, report: Report, plugin: Plugin[Any]) -> list[SensorSpec]:
+    """Return what a `<sensor>` is: one sensor, or several that look through the same glass."""
     with plugin.guard:
         sensor = plugin.load().for_element(element)
         common = read_common(element, link, report, topic=sensor.topic, rate_hz=sensor.rate_hz)
         spec: SensorSpec = sensor.read(element, common, report)
-    if not isinstance(spec, SensorSpec):
-        raise plugin.error(f"reads a {type(spec).__name__} from its <sensor>; it must be a SensorSpec")
-    return spec if plugin.ships else replace(spec, plugin=plugin)
+        specs = [spec, *sensor.companions(element, spec, report)]
+    for each in specs:
+        if not isinstance(each, SensorSpec):
+            raise plugin.error(f"reads a {type(each).__name__} from its <sensor>; it must be a SensorSpec")
+    return specs if plugin.ships else [replace(each, plugin=plugin) for each in specs]
 
 
 def read_common(element: Element, link: str, report: Report, *, topic: str, rate_hz: float) -> Common:

@@ -58,7 +58,7 @@ class Placement(NamedTuple, Generic[Shown]):
     shown: Shown | None
 
 
-class _SpatialChannel(Channel[Placement[Shown]]):
+class SpatialChannel(Channel[Placement[Shown]]):
     """A topic whose messages have a place each.
 
     What is in the frame of a body, such as a scan, stays where that body truly was when it was published:
@@ -121,7 +121,7 @@ class Scan(NamedTuple):
     ranges: Floats
 
 
-class ScanChannel(_SpatialChannel[Scan]):
+class ScanChannel(SpatialChannel[Scan]):
     """sensor_msgs/LaserScan as points in the frame of the true lidar: returns from range_min to range_max."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
@@ -167,7 +167,7 @@ class Raster(NamedTuple):
     """Row by row from the far side, as Rerun's images are."""
 
 
-class GridChannel(_SpatialChannel[Raster]):
+class GridChannel(SpatialChannel[Raster]):
     """nav_msgs/OccupancyGrid as a raster on the floor; sent only when it changed."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
@@ -245,7 +245,7 @@ class GridUpdateChannel(Channel[Any]):
         return ()
 
 
-class PathChannel(_SpatialChannel[Floats]):
+class PathChannel(SpatialChannel[Floats]):
     """nav_msgs/Path as a line; sent only when it changed."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
@@ -268,7 +268,7 @@ class PathChannel(_SpatialChannel[Floats]):
         yield self.entity, sim_time(times), (STRIPS.column(lines),)
 
 
-class PoseArrayChannel(_SpatialChannel[NDArray[np.float64]]):
+class PoseArrayChannel(SpatialChannel[NDArray[np.float64]]):
     """geometry_msgs/PoseArray, such as AMCL's particles, as short arrows."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:

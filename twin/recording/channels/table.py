@@ -6,6 +6,7 @@ from typing import Any
 
 from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
+from twin.recording.channels.clouds import CloudChannel
 from twin.recording.channels.series import (
     DocumentChannel,
     JointChannel,
@@ -24,6 +25,7 @@ from twin.recording.channels.spatial import (
 
 _BY_TYPE: dict[str, type[Any]] = {
     "sensor_msgs/msg/LaserScan": ScanChannel,
+    "sensor_msgs/msg/PointCloud2": CloudChannel,
     "nav_msgs/msg/OccupancyGrid": GridChannel,
     "map_msgs/msg/OccupancyGridUpdate": GridUpdateChannel,
     "nav_msgs/msg/Path": PathChannel,

@@ -106,11 +106,37 @@ class BodiesInReach:
         self._counts[self._bodies] = self._all
 
 
-class FanSlice:
-    """While entered, `mj_multiRay` does not see the scenery that the plane of a flat fan misses.
+class _Scenery:
+    """While entered, `mj_multiRay` does not see the scenery that `look` found to be out of the way.
 
-    It tests every ray against every shape; most of a scene lies above or below a lidar.
+    It tests every ray against every shape.
     """
+
+    def __init__(self, model: mujoco.MjModel, groups: NDArray[np.uint8], is_sliced: bool) -> None:
+        """Bind to a model.
+
+        Args:
+            model: The compiled world.
+            groups: Of the shapes that rays see, shape (mjNGROUP,).
+            is_sliced: If not, all is seen.
+        """
+        self._groups = model.geom_group
+        bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+        is_sliced = is_sliced and not groups[_HIDDEN]
+        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & is_sliced)
+        self._centre, self._half = _boxes(model, self._geoms)
+        self._shown = self._groups[self._geoms]
+        self._now = self._shown
+
+    def __enter__(self) -> None:
+        self._groups[self._geoms] = self._now
+
+    def __exit__(self, *_: object) -> None:
+        self._groups[self._geoms] = self._shown
+
+
+class FanSlice(_Scenery):
+    """Leaves out the scenery that the plane of a flat fan misses: most of it is above or below a lidar."""
 
     def __init__(
         self,
@@ -128,16 +154,10 @@ class FanSlice:
             savings: What is not done over again.
         """
         normal = _normal(directions)
+        super().__init__(model, groups, normal is not None and savings.plane_of_rays)
         self._normal = np.zeros(3) if normal is None else normal
         """Of the plane, in the link's frame."""
-        self._groups = model.geom_group
-        bounded = (model.geom_bodyid == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-        sliced = normal is not None and not groups[_HIDDEN] and savings.plane_of_rays
-        self._geoms = np.flatnonzero(_are_seen(model, groups) & bounded & sliced)
-        self._centre, self._half = _boxes(model, self._geoms)
         self._radius = float(np.linalg.norm(np.abs(self._centre) + self._half, axis=1).max(initial=0.0))
-        self._shown = self._groups[self._geoms]
-        self._now = self._shown
         self._plane: tuple[Array, float] = np.zeros(3), math.inf
         """Normal and height [m] when it was looked at last, in the world."""
 
@@ -152,11 +172,47 @@ class FanSlice:
         reach = self._half @ np.abs(normal) + _SLACK_M
         self._now = np.where(np.abs(self._centre @ normal - height) > reach, _HIDDEN, self._shown)
 
-    def __enter__(self) -> None:
-        self._groups[self._geoms] = self._now
 
-    def __exit__(self, *_: object) -> None:
-        self._groups[self._geoms] = self._shown
+class PyramidSlice(_Scenery):
+    """Leaves out the scenery beside a bundle of rays, such as a part of what a spinning lidar sees."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        directions: Array,
+        groups: NDArray[np.uint8],
+        savings: Savings = ALL,
+    ) -> None:
+        """Bind to a model; as `FanSlice`, but where rays fill a plane, or go apart too far, all is seen."""
+        sides = _sides(directions) if _normal(directions) is None else None
+        super().__init__(model, groups, sides is not None and savings.plane_of_rays)
+        self._sides = np.zeros((0, 3)) if sides is None else sides
+
+    def look(self, data: mujoco.MjData, body: int) -> None:
+        """Find what the pyramid of the rays of a link `body` holds at present."""
+        if not len(self._geoms):
+            return
+        sides = self._sides @ data.xmat[body].reshape(3, 3).T
+        inside = (self._centre - data.xpos[body]) @ sides.T + self._half @ np.abs(sides).T
+        self._now = np.where(inside.min(axis=1) < -_SLACK_M, _HIDDEN, self._shown)
+
+
+def _sides(directions: Array) -> Array | None:
+    """Return inward normals of a pyramid that holds rays, shape (4, 3); None: they go apart too far."""
+    axis = directions.mean(axis=0)
+    length = float(np.linalg.norm(axis))
+    if length < 0.1:
+        return None
+    axis /= length
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    along = directions @ axis
+    if along.min() < 0.1:
+        return None
+    sides = []
+    for side in (across / np.linalg.norm(across), np.cross(axis, across / np.linalg.norm(across))):
+        slopes = directions @ side / along
+        sides += [side - slopes.min() * axis, slopes.max() * axis - side]
+    return np.array([side / np.linalg.norm(side) for side in sides])
 
 
 def _normal(directions: Array) -> Array | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from twin.geometry import Array
 from twin.sim.compose import GROUP_COLLISION, GROUP_SOLID
-from twin.sim.sensors.culling import BodiesInReach, FanSlice, RayBounds
+from twin.sim.sensors.culling import BodiesInReach, FanSlice, PyramidSlice, RayBounds
 from twin.sim.sensors.sensor import Mount
 
 
@@ -38,6 +38,7 @@ class RayCaster:
         savings = mount.world.savings
         self._bounds = RayBounds(self._model, self._groups, savings)
         self._slice = FanSlice(self._model, self._directions, self._groups, savings)
+        self._pyramid = PyramidSlice(self._model, self._directions, self._groups, savings)
         self._bodies = BodiesInReach(self._model, self._directions, self._groups, cutoff, savings)
 
     def cast(self) -> Array:
@@ -45,8 +46,9 @@ class RayCaster:
         data = self._data
         np.matmul(self._directions, data.xmat[self._body].reshape(3, 3).T, out=self.directions)
         self._slice.look(data, self._body)
+        self._pyramid.look(data, self._body)
         self._bodies.look(data, self._body)
-        with self._bounds, self._slice, self._bodies:
+        with self._bounds, self._slice, self._pyramid, self._bodies:
             mujoco.mj_multiRay(
                 self._model,
                 data,

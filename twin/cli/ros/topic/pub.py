@@ -99,6 +99,7 @@ def pub(
     joining: Joining,
 ) -> None:
     """Publish a message once, some times or at a rate."""
+    from twin.bridge.messages.as_text import message_repr
     from twin.cli.ros.topic.process import open_topics
 
     given = values_of(text_of(values, stdin))
@@ -107,10 +108,35 @@ def pub(
         cls = _message_class(process, name, message_type)
         make = _maker(process, cls, given)
         publisher = process.node.create_publisher(cls, name, choice.qos())
-        _wait_for_subscriptions(process, publisher, plan)
-        typer.echo("publisher: beginning loop")
-        _publish(process, publisher, make, plan)
-        process.live.spin(timeout_s=plan.keep_alive)
+        publish_as_planned(process, publisher, make, plan, message_repr)
+
+
+def publish_as_planned(
+    process: TopicProcess,
+    publisher: Publisher[Any],
+    make: Callable[[], Any],
+    plan: PublishPlan,
+    describe: Callable[[Any], str],
+) -> None:
+    """Publish what `make` returns as often as planned; `describe` is for what is printed."""
+    _wait_for_subscriptions(process, publisher, plan)
+    typer.echo("publisher: beginning loop")
+    count = 0
+
+    def publish() -> None:
+        nonlocal count
+        count += 1
+        message = make()
+        if plan.print_every and count % plan.print_every == 0:
+            typer.echo(f"publishing #{count}: {describe(message)}\n")
+        publisher.publish(message)
+
+    publish()
+    if plan.count != 1:
+        timer = process.node.create_timer(round(1e9 / plan.rate), publish)
+        process.live.spin(lambda: 0 < plan.count <= count)
+        timer.cancel()
+    process.live.spin(timeout_s=plan.keep_alive)
 
 
 def _message_class(process: TopicProcess, name: str, typename: str) -> type[Any]:
@@ -163,25 +189,3 @@ def _wait_for_subscriptions(process: TopicProcess, publisher: Publisher[Any], pl
         waited_s += step_s
     # A publisher that nobody waits for may still be on its way to somebody.
     process.live.spin(lambda: publisher.has_subscribers, timeout_s=_CONNECTED_S if plan.wait_for else 0.1)
-
-
-def _publish(
-    process: TopicProcess, publisher: Publisher[Any], make: Callable[[], Any], plan: PublishPlan
-) -> None:
-    from twin.bridge.messages.as_text import message_repr
-
-    count = 0
-
-    def publish() -> None:
-        nonlocal count
-        count += 1
-        message = make()
-        if plan.print_every and count % plan.print_every == 0:
-            typer.echo(f"publishing #{count}: {message_repr(message)}\n")
-        publisher.publish(message)
-
-    publish()
-    if plan.count != 1:
-        timer = process.node.create_timer(round(1e9 / plan.rate), publish)
-        process.live.spin(lambda: 0 < plan.count <= count)
-        timer.cancel()
