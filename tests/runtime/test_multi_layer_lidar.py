@@ -220,3 +220,19 @@ def test_a_bag_a_recording_and_a_check_want_clouds_and_change_nothing_else(
     assert len(read_bag(tmp_path / "bag")[TOPIC]["width"]) == 5
     positions = read(tmp_path / "room.rrd").column(f"/ros{TOPIC}", "Points3D:positions")
     assert positions.times_ns.tolist() == [100_000_000, 500_000_000]
+
+
+@pytest.mark.parametrize("of", ["readings", "values"])
+def test_clouds_and_single_points_drop_out(of: str, scenario: MakeScenario, make_run: MakeRun) -> None:
+    fault = f"faults: [dropout: {{sensor: velodyne_points, share: 0.4, of: {of}}}]\n"
+    whole = clouds_of(run_of(scenario, make_run))
+    lossy = clouds_of(make_run(scenario(ROOM.format(v=0, w=0, noise=0, seed=1) + fault)))
+    if of == "readings":
+        stamps = {ns(cloud.header.stamp) for cloud in lossy}
+        assert 0 < len(stamps) < 5
+        assert stamps <= {ns(cloud.header.stamp) for cloud in whole}
+        return
+    kept = [set(read_points(cloud).tolist()) for cloud in lossy]
+    assert [len(points) / 28800 for points in kept] == pytest.approx([0.6] * 5, abs=0.02)
+    assert kept[0] <= set(read_points(whole[0]).tolist())
+    assert (lossy[0].is_dense, lossy[0].point_step, lossy[0].header) == (True, 22, whole[0].header)
