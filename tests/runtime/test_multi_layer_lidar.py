@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from twin.api.bags import read_bag
 from twin.bridge.msgs import PointCloud2, ns
 from twin.bridge.point_cloud2 import read_points
 from twin.bridge.qos import SENSOR_DATA
@@ -17,6 +20,8 @@ from twin.clouds.deskewing import deskewed
 from twin.clouds.points import coordinates, transformed
 from twin.geometry import Pose3
 from twin.recording.digest import RunDigest
+from twin.recording.read_back import read
+from twin.runtime.open_run import OpenRun
 from twin.runtime.run import Run
 from twin.scenario.schema import Scenario
 from twin.sensors.multi_layer_lidar import MultiLayerLidar
@@ -137,6 +142,8 @@ def test_noise_is_along_the_rays_and_as_large_as_the_robot_file_says(
         for noise in (0.0, 0.02)
     )
     error = np.linalg.norm(noisy, axis=1) - np.linalg.norm(exact, axis=1)
+    groups = np.corrcoef(error.reshape(10, -1))[np.triu_indices(10, 1)]
+    assert np.abs(groups).max() < 0.1
     assert np.std(error) == pytest.approx(0.02, rel=0.05)
     assert abs(np.mean(error)) < 0.001
     cosine = (
@@ -174,3 +181,58 @@ def test_who_comes_in_the_middle_of_a_turn_hears_the_next_whole_one(
         run.tick()
     assert [ns(cloud.header.stamp) for cloud in heard[:2]] == [210_000_000, 310_000_000]
     assert {len(read_points(cloud)) for cloud in heard} == {16 * 1800}
+    assert min(poses) == 210_000_000
+
+
+def test_what_is_nearer_or_farther_than_its_range_is_not_in_the_cloud(
+    scenario: MakeScenario, make_run: MakeRun
+) -> None:
+    run = run_of(scenario, make_run)
+    lidar = next(it for it in run.world.robots["jackal"].sensors if isinstance(it, MultiLayerLidar))
+    lidar.spec = replace(lidar.spec, range_min=2.1, range_max=2.8)
+    whole, cut = (read_points(clouds_of(each)[0]) for each in (run_of(scenario, make_run), run))
+    distance = np.linalg.norm(coordinates(whole), axis=1)
+    np.testing.assert_array_equal(cut, whole[(distance >= 2.1) & (distance <= 2.8)])
+    assert 0 < len(cut) < len(whole) / 2
+
+
+def test_a_bag_a_recording_and_a_check_want_clouds_and_change_nothing_else(
+    scenario: MakeScenario, poses: Poses, tmp_path: Path
+) -> None:
+    room = ROOM.format(v=0.5, w=0, noise=0.01, seed=1)
+    check = f"checks: [{{always: {TOPIC}.width < 30000}}]"
+    checked = "\n".join(check if line.startswith("checks:") else line for line in room.splitlines())
+    cast: dict[str, int] = {}
+    digests = set()
+    for name, text, options in (
+        ("nothing", room, {"record": False}),
+        ("bag", room, {"record": False, "bag": tmp_path / "bag"}),
+        ("recording", room, {"out": tmp_path}),
+        ("check", checked, {"record": False}),
+    ):
+        poses.clear()
+        run = OpenRun(scenario(text), **options)
+        run.advance_to_end()
+        digests.add(run.finish().digest)
+        cast[name] = len(poses)
+    assert cast == {"nothing": 0, "bag": 50, "recording": 50, "check": 50}
+    assert len(digests) == 1
+    assert len(read_bag(tmp_path / "bag")[TOPIC]["width"]) == 5
+    positions = read(tmp_path / "room.rrd").column(f"/ros{TOPIC}", "Points3D:positions")
+    assert positions.times_ns.tolist() == [100_000_000, 500_000_000]
+
+
+@pytest.mark.parametrize("of", ["readings", "values"])
+def test_clouds_and_single_points_drop_out(of: str, scenario: MakeScenario, make_run: MakeRun) -> None:
+    fault = f"faults: [dropout: {{sensor: velodyne_points, share: 0.4, of: {of}}}]\n"
+    whole = clouds_of(run_of(scenario, make_run))
+    lossy = clouds_of(make_run(scenario(ROOM.format(v=0, w=0, noise=0, seed=1) + fault)))
+    if of == "readings":
+        stamps = {ns(cloud.header.stamp) for cloud in lossy}
+        assert 0 < len(stamps) < 5
+        assert stamps <= {ns(cloud.header.stamp) for cloud in whole}
+        return
+    kept = [set(read_points(cloud).tolist()) for cloud in lossy]
+    assert [len(points) / 28800 for points in kept] == pytest.approx([0.6] * 5, abs=0.02)
+    assert kept[0] <= set(read_points(whole[0]).tolist())
+    assert (lossy[0].is_dense, lossy[0].point_step, lossy[0].header) == (True, 22, whole[0].header)

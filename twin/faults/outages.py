@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from twin.bridge.msgs import PointCloud2
+from twin.bridge.point_cloud2 import cloud_of, read_points
 from twin.faults.fault import Effect, FaultContext, refuse
 from twin.faults.messages import Counted, linked
 from twin.faults.quantities import altered, values_of, with_field
@@ -30,13 +32,14 @@ class Dropout(ReadingFault):
         """Of the readings, or of the values, that are missing; each on its own."""
         of: Literal["readings", "values"] = "readings"
         """`readings`: nothing is said (joints: the last reading again). `values`: single numbers of an array,
-        such as rays of a scan, are NaN."""
+        such as rays of a scan, are NaN; of a cloud, points are left out."""
 
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
         self._stream = self.noise(config.sensor)
         self.did = "dropped" if config.of == "readings" else "with missing values"
-        if config.of == "values" and not isinstance(values_of(self.example).get(self.measures), np.ndarray):
+        has_values = isinstance(values_of(self.example).get(self.measures), np.ndarray)
+        if config.of == "values" and not (has_values or isinstance(self.example, PointCloud2)):
             raise refuse("of", f"sensor '{config.sensor}' measures no array of values; valid is readings")
 
     def alter(self, reading: Any, time_ns: int) -> Any:
@@ -44,6 +47,9 @@ class Dropout(ReadingFault):
         tick, share = self.tick(time_ns), self.config.share
         if self.config.of == "readings":
             return None if self._stream.uniform(tick, 1)[0] < share else reading
+        if isinstance(reading, PointCloud2):
+            points = read_points(reading)
+            return cloud_of(reading.header, points[self._stream.uniform(tick, len(points)) >= share])
 
         def without(values: Array) -> Array:
             return np.where(self._stream.uniform(tick, len(values)) < share, math.nan, values)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from twin.bridge.msgs import Header, PointCloud2, ns, stamp
 from twin.bridge.point_cloud2 import create_cloud, fields_of
-from twin.clouds.points import Points
-from twin.geometry import Array
+from twin.clouds.points import XYZ, Points
 from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report, text_of
 from twin.models.urdf.drives import library_of
@@ -146,15 +145,18 @@ class MultiLayerLidar(Sensor):
         azimuth = np.linspace(spec.angle_min, spec.angle_max, spec.columns)
         elevation = np.linspace(spec.elevation_min, spec.elevation_max, spec.layers)
         level, height = np.cos(elevation), np.sin(elevation)
-        self._groups: list[tuple[Array, NDArray[np.uint16], RayCaster]] = []
+        self._groups: list[tuple[RayCaster, NDArray[np.float32], Points]] = []
+        """Of each: its rays, their directions as columns, and points of which only the rings are known."""
         for part in np.array_split(azimuth, spec.groups):
             rays = np.empty((len(part), spec.layers, 3))
             rays[..., 0] = np.cos(part)[:, np.newaxis] * level
             rays[..., 1] = np.sin(part)[:, np.newaxis] * level
             rays[..., 2] = height
             directions = rays.reshape(-1, 3)
-            rings = np.tile(np.arange(spec.layers, dtype=np.uint16), len(part))
-            self._groups.append((directions, rings, RayCaster(mount, directions, cutoff=spec.range_max)))
+            points = np.zeros(len(directions), _POINT)
+            points["ring"] = np.tile(np.arange(spec.layers), len(part))
+            columns = np.ascontiguousarray(directions.T, dtype=np.float32)
+            self._groups.append((RayCaster(mount, directions, cutoff=spec.range_max), columns, points))
         self._turn: list[Points] = []
         self._start_ns = 0
 
@@ -173,20 +175,20 @@ class MultiLayerLidar(Sensor):
 
     def _cast(self, group: int, time_ns: int) -> Points:
         spec: MultiLayerLidarSpec = self.spec
-        directions, rings, rays = self._groups[group]
+        rays, columns, blank = self._groups[group]
         distance = rays.cast()
-        seen = np.flatnonzero((distance >= spec.range_min) & (distance <= spec.range_max))
-        ranges = distance[seen]
+        seen = (distance >= spec.range_min) & (distance <= spec.range_max)
+        ranges = np.where(seen, distance, 0.0)
         if spec.noise_stddev > 0.0:
-            ranges += spec.noise_stddev * self._normal(time_ns, len(distance))[seen]
-        points = np.empty(len(seen), _POINT)
-        xyz = directions[seen] * ranges[:, np.newaxis]
-        points["x"], points["y"], points["z"] = xyz.T
-        cosine = np.einsum("ij,ij->i", rays.directions[seen], rays.normals[seen])
+            ranges += spec.noise_stddev * self._normal(time_ns, len(ranges))
+        # Whole columns, from which points are taken at the end: to gather them first takes twice as long.
+        points, metres = blank.copy(), ranges.astype(np.float32)
+        for name, column in zip(XYZ, columns, strict=True):
+            np.multiply(column, metres, out=points[name])
+        cosine = np.einsum("ij,ij->i", rays.directions, rays.normals)
         points["intensity"] = _WHITE * np.abs(cosine)
-        points["ring"] = rings[seen]
         points["time"] = (time_ns - self._start_ns) * 1e-9
-        return points
+        return points if seen.all() else points[seen]
 
     @classmethod
     def to_message(cls, spec: MultiLayerLidarSpec, header: Header, reading: MultiLayerReading) -> PointCloud2:
