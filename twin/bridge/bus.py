@@ -20,7 +20,7 @@ from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
 from twin.bridge.services import Service
 from twin.bridge.services.questions import ZenohQuestion
-from twin.bridge.topics import Endpoint, Sample, Subscription
+from twin.bridge.topics import Endpoint, Publisher, Sample, Subscription
 from twin.bridge.topics.in_process import InProcess, Member
 from twin.bridge.topics.link import Carried, Link
 from twin.bridge.wire import Wire
@@ -41,6 +41,8 @@ _left: list[Any] = []
 """What Zenoh made in the process of which this one is a fork."""
 
 Tap = Callable[[Sample[Any]], None]
+Appetite = Callable[["Publisher[Any]"], bool]
+"""Tells whether a publisher is to publish, now, what it publishes on demand only."""
 
 
 class Bus:
@@ -69,6 +71,10 @@ class Bus:
         self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
+        self.needs: list[Appetite] = []
+        """Of taps without which the run would not be what was asked for, such as a bag's."""
+        self.wishes: list[Appetite] = []
+        """Of taps that go without it where it cannot be had, such as a recording's."""
         self.arrival_taps: list[Callable[[Arrival], None]] = []
         """Called for everything from outside when it enters, before a node has it."""
         self.link: Link | None = None

@@ -96,9 +96,13 @@ class Endpoint:
 class Publisher(Endpoint, Generic[M]):
     """Publishes messages of one type on a topic."""
 
-    def __init__(self, node: Node, msg_type: type[M] | str, name: str, qos: QoS) -> None:
+    def __init__(
+        self, node: Node, msg_type: type[M] | str, name: str, qos: QoS, *, on_demand: bool = False
+    ) -> None:
         self.codec: Codec[M] = codec(msg_type)
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
+        self.on_demand = on_demand
+        """Whether it publishes only what somebody wants: then that is no part of what the run was."""
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
         self.msgtype = self.codec.msgtype
@@ -121,6 +125,17 @@ class Publisher(Endpoint, Generic[M]):
         if self._listeners is not None and self._listeners.is_direct:
             return bool(self._listeners.receivers)
         return bool(self._zenoh.matching_status.matching)
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether somebody who takes part in the run wants what is published on demand now."""
+        local = self._bus.in_process.listeners(self.key).receivers
+        return bool(local) or any(appetite(self) for appetite in self._bus.needs)
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether anybody does, here or elsewhere."""
+        return self.is_needed or self.has_subscribers or any(appetite(self) for appetite in self._bus.wishes)
 
     def publish(self, message: M, *, frozen: bool = False) -> None:
         """Publish at the clock's time.
