@@ -22,8 +22,8 @@ PACKAGES = "`apt-get install libegl1 libgl1-mesa-dri`, or `libosmesa6` and MUJOC
 """Where both are."""
 
 _FLAGS = mujoco.mjtRndFlag
-_PLAIN = {_FLAGS.mjRND_SKYBOX: 0, _FLAGS.mjRND_SEGMENT: 1, _FLAGS.mjRND_IDCOLOR: 1}
-"""For a picture of distances: no sky, which is a box before the far plane, and no light."""
+_PLAIN = {_FLAGS.mjRND_SEGMENT: 1, _FLAGS.mjRND_IDCOLOR: 1}
+"""For a picture of distances: no light, and no sky, which is a box before the far plane."""
 
 
 class Canvas:
