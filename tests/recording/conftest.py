@@ -10,7 +10,8 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -72,6 +73,7 @@ class FakeSample:
     time_ns: int
     payload: bytes
     message: Any
+    publisher: ClassVar[Any] = SimpleNamespace(on_demand=False)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,13 @@ SECOND = 1_000_000_000
 
 
 def sample(topic: str, time_ns: int, payload: bytes) -> Any:
-    return SimpleNamespace(topic=topic, msgtype="std_msgs/msg/String", time_ns=time_ns, payload=payload)
+    return SimpleNamespace(
+        topic=topic,
+        msgtype="std_msgs/msg/String",
+        time_ns=time_ns,
+        payload=payload,
+        publisher=SimpleNamespace(on_demand=False),
+    )
 
 
 def hashes(samples: list[Any], seconds: int, states: str = "abcdefgh") -> RunHashes:

@@ -69,7 +69,8 @@ def run_of(
 def clouds_of(run: Run) -> list[PointCloud2]:
     """Return the clouds of a run that somebody wants."""
     clouds: list[PointCloud2] = []
-    run.bus.demand(lambda sample: clouds.append(sample.message), lambda topic, _: topic == TOPIC)
+    run.bus.needs.append(lambda publisher: publisher.name == TOPIC)
+    run.bus.tap(lambda sample: clouds.append(sample.message) if sample.topic == TOPIC else None)
     while not run.over:
         run.tick()
     return clouds
@@ -161,7 +162,7 @@ def test_nothing_is_cast_that_nobody_wants_and_the_digest_is_the_same(
         run.bus.tap(digest.on_sample)
         if wanted:
             assert not poses
-            run.bus.demand(lambda sample: None, lambda topic, _: topic == TOPIC)
+            run.bus.needs.append(lambda publisher: publisher.name == TOPIC)
         while not run.over:
             run.tick()
         digests.append(digest.finish(run.world.state_digest()))

@@ -10,7 +10,7 @@ import pytest
 from twin.errors import SimulationError
 from twin.geometry import Pose3
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
-from twin.sim import photo
+from twin.sim import canvas
 from twin.sim.photo import Camera, Solid, take
 
 RED, GREEN = (0.9, 0.0, 0.0, 1.0), (0.0, 0.9, 0.0, 1.0)
@@ -24,7 +24,7 @@ def is_like(pixel: np.ndarray, rgba: tuple[float, ...]) -> bool:
 
 
 @pytest.mark.skipif(
-    not any(map(ctypes.util.find_library, photo.BACKENDS.values())),
+    not any(map(ctypes.util.find_library, canvas.BACKENDS.values())),
     reason="neither EGL nor OSMesa is installed",
 )
 @pytest.mark.parametrize(
@@ -57,6 +57,6 @@ def test_without_opengl_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SimulationError, match="needs EGL or OSMesa"):
         take([], FROM_ABOVE)
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: name)
-    monkeypatch.setattr(photo, "BACKENDS", {"no_such_module": "EGL"})
+    monkeypatch.setattr(canvas, "BACKENDS", {"no_such_module": "EGL"})
     with pytest.raises(SimulationError, match="finds no OpenGL without a display"):
         take([], FROM_ABOVE)

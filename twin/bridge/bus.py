@@ -20,7 +20,7 @@ from twin.bridge.node.options import NodeOptions
 from twin.bridge.node.services import StandardServices
 from twin.bridge.services import Service
 from twin.bridge.services.questions import ZenohQuestion
-from twin.bridge.topics import Endpoint, Sample, Subscription
+from twin.bridge.topics import Endpoint, Publisher, Sample, Subscription
 from twin.bridge.topics.in_process import InProcess, Member
 from twin.bridge.topics.link import Carried, Link
 from twin.bridge.wire import Wire
@@ -41,8 +41,8 @@ _left: list[Any] = []
 """What Zenoh made in the process of which this one is a fork."""
 
 Tap = Callable[[Sample[Any]], None]
-Demand = Callable[[str, str], bool]
-"""Whether a topic with messages of a type is wanted."""
+Appetite = Callable[["Publisher[Any]"], bool]
+"""Tells whether a publisher is to publish, now, what it publishes on demand only."""
 
 
 class Bus:
@@ -71,7 +71,10 @@ class Bus:
         self.standard_services = StandardServices(at_once=networked)
         self.external = ExternalQueue(_EXTERNAL_DEPTH)
         self.taps: list[Tap] = []
-        self.demands: list[tuple[Tap, Demand]] = []
+        self.needs: list[Appetite] = []
+        """Of taps without which the run would not be what was asked for, such as a bag's."""
+        self.wishes: list[Appetite] = []
+        """Of taps that go without it where it cannot be had, such as a recording's."""
         self.arrival_taps: list[Callable[[Arrival], None]] = []
         """Called for everything from outside when it enters, before a node has it."""
         self.incoming: Callable[[str, Any], None] | None = None
@@ -289,17 +292,9 @@ class Bus:
     def tap(self, callback: Tap) -> None:
         """Call back for every sample that this process publishes, while it publishes it.
 
-        What is published on demand (`Publisher.on_demand`) is left out: to hear of it changes what there is.
+        To hear of it makes nothing be published that is published on demand: `needs` and `wishes` do.
         """
         self.taps.append(callback)
-
-    def demand(self, callback: Tap, wants: Demand) -> None:
-        """Have topics published that are published on demand only, and call back for their samples."""
-        self.demands.append((callback, wants))
-
-    def demanding(self, topic: str, msgtype: str) -> list[Tap]:
-        """Return who demands a topic."""
-        return [callback for callback, wants in self.demands if wants(topic, msgtype)]
 
     def go_alone(self) -> None:
         """Be, in a fork, a bus without a network: what Zenoh made is kept, and never touched again.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict, is_dataclass
 from typing import Any
 
 import mujoco
@@ -89,15 +90,8 @@ class SensorBuilder:
         return sum(sensor.type == kind for sensor in self.spec.sensors)
 
     def _camera(self, camera: CameraSpec) -> str:
-        tangent = math.tan(camera.horizontal_fov / 2.0) * camera.height / camera.width
-        pose, name = camera.T_link_sensor, self._free(camera.name)
-        self.spec.body(camera.link).add_camera(
-            name=name,
-            pos=pose.xyz,
-            quat=multiply_wxyz(pose.quat_wxyz, LENS_ALONG_X),
-            fovy=math.degrees(2.0 * math.atan(tangent)),
-            resolution=[camera.width, camera.height],
-        )
+        name = self._free(camera.name)
+        add_camera(self.spec.body(camera.link), name, camera)
         return name
 
     def _free(self, name: str) -> str:
@@ -107,8 +101,34 @@ class SensorBuilder:
         return free
 
 
+def add_camera(
+    body: mujoco.MjsBody, name: str, camera: CameraSpec, resolution: tuple[int, int] | None = None
+) -> None:
+    """Add a camera to the body of its link.
+
+    Args:
+        body: Of the link.
+        name: In the model.
+        camera: Its pose and, for a given resolution, its focal length count.
+        resolution: Width and height [pixels] if they are not the camera's own.
+    """
+    width, height = resolution or (camera.width, camera.height)
+    pose = camera.T_link_sensor
+    body.add_camera(
+        name=name,
+        pos=pose.xyz,
+        quat=multiply_wxyz(pose.quat_wxyz, LENS_ALONG_X),
+        fovy=math.degrees(2.0 * math.atan(height / 2.0 / camera.lens.focal_length)),
+        resolution=[width, height],
+    )
+
+
 def _described(sensor: SensorSpec, names: list[str]) -> dict[str, Any]:
-    values = {name: value for name, value in vars(sensor).items() if name not in ("T_link_sensor", "plugin")}
+    values = {
+        name: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+        for name, value in vars(sensor).items()
+        if name not in ("T_link_sensor", "plugin")
+    }
     pose = sensor.T_link_sensor
     return {
         "type": type(sensor).__name__.removesuffix("Spec").lower(),

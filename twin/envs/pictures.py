@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import GymError
 from twin.geometry import Array
-from twin.sim.photo import Canvas
+from twin.sim.canvas import Canvas
 
 _SAMPLES = 4
 """Of each pixel; with MuJoCo's shadows and reflections as well, a picture would take ten times as long."""

@@ -12,6 +12,7 @@ from twin.models.expansion.expand import expand
 from twin.models.kinematics import rigid_groups
 from twin.models.mass_properties import describe_repair
 from twin.models.options import DEFAULTS, ReadOptions
+from twin.models.urdf.cameras import read_cameras
 from twin.models.urdf.commands import read_commands, read_states, read_transmissions
 from twin.models.urdf.document import Element, Report, parse
 from twin.models.urdf.drives import read_drive
@@ -26,7 +27,7 @@ from twin.models.urdf.joints import check_tree, read_joint, unique, without_idle
 from twin.models.urdf.line_table import LineTable
 from twin.models.urdf.links import LinkContext, read_link, read_materials
 from twin.models.urdf.packages import PackagePath, Packages
-from twin.models.urdf.sensors import read_cameras, read_sensors
+from twin.models.urdf.sensors import read_sensors
 from twin.models.urdf.xml_text import as_utf8, read_utf8
 
 VERSIONS = ("1", "1.0", "1.1", "1.2")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 from twin.geometry import Pose3
+from twin.models.lens import Lens
 from twin.periods import Period, period_of
 from twin.plugins import Plugin
 
@@ -86,8 +87,42 @@ class SensorSpec:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CameraTopics:
+    """Relative ROS names of what a camera publishes."""
+
+    image: str
+    """Colours; JPEG pictures are below it, on `compressed`."""
+    info: str
+    depth: str
+    depth_info: str
+    points: str
+
+    @classmethod
+    def below(cls, base: str) -> CameraTopics:
+        """Return the names that drivers of RGB-D cameras use below `base`."""
+        return cls(
+            image=f"{base}/image_raw",
+            info=f"{base}/camera_info",
+            depth=f"{base}/depth/image_raw",
+            depth_info=f"{base}/depth/camera_info",
+            points=f"{base}/depth/points",
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthNoise:
+    """How wrong a depth camera is; both models grow with the square of the distance."""
+
+    model: Literal["realsense", "kinect"]
+    baseline: float = 0.05
+    """Between the two imagers of `realsense` [m]."""
+    subpixel: float = 0.08
+    """RMS error of its disparity [pixels]."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CameraSpec(SensorSpec):
-    """A camera that looks along +x of its link with +z up, as Gazebo's do; `twin.sim` renders none."""
+    """A camera that looks along +x of its link with +z up, as Gazebo's do."""
 
     horizontal_fov: float
     """Full angle [rad]."""
@@ -101,5 +136,29 @@ class CameraSpec(SensorSpec):
     """Clipping distance [m]."""
     noise_stddev: float = 0.0
     """Of a pixel's value, from 0 to 1."""
+    noise_mean: float = 0.0
+    """Likewise."""
     optical_frame: str | None = None
     """Frame that stamps its images: +z forward, +x right (REP-103)."""
+    topics: CameraTopics = field(default_factory=lambda: CameraTopics.below("camera"))
+    colour: bool = True
+    """Whether it makes images of colours."""
+    depth: bool = False
+    """Whether it makes images of depth."""
+    encoding: Literal["rgb8", "bgr8", "mono8"] = "rgb8"
+    """Of the images of colours."""
+    depth_encoding: Literal["32FC1", "16UC1"] = "32FC1"
+    """Metres, or millimetres (REP-118)."""
+    depth_noise: DepthNoise | None = None
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """Of `Lens`."""
+
+    @property
+    def lens(self) -> Lens:
+        """How it projects."""
+        return Lens(
+            width=self.width,
+            height=self.height,
+            horizontal_fov=self.horizontal_fov,
+            distortion=self.distortion,
+        )

@@ -36,9 +36,9 @@ class SensorPublisher:
         kind = self._plugin.load()
         self._message, self._to_message = kind.message, kind.to_message
         self._publisher: Publisher[Any] = self.node.create_publisher(
-            kind.message, sensor.spec.topic, SENSOR_DATA
+            kind.message, sensor.spec.topic, SENSOR_DATA, on_demand=kind.on_demand
         )
-        self._publisher.on_demand = self._on_demand = kind.on_demand
+        self._on_demand = kind.on_demand
 
     def publish(self, time_ns: int) -> None:
         """Sample at `time_ns` and publish, stamped with it; a sensor that fails may have nothing to say."""

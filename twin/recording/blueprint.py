@@ -28,7 +28,12 @@ _LEGEND_ROOM = 1.35
 
 
 def layout(
-    stage: Stage, robots: Sequence[RobotBox], end_ns: int | None = None, *, mirrors: bool = False
+    stage: Stage,
+    robots: Sequence[RobotBox],
+    end_ns: int | None = None,
+    *,
+    mirrors: bool = False,
+    pictures: Sequence[str] = (),
 ) -> rrb.Blueprint:
     """Return the screen: 3-D, mission, plots on the left; close-up, map, verdict and log on the right.
 
@@ -38,6 +43,7 @@ def layout(
         end_ns: Simulated time at which the recording ends [ns]; None: it goes on.
         mirrors: How far virtual and physical robots are apart comes before the joints, and the status of
             the mirror before the verdict.
+        pictures: Entities of what cameras see; each is beside the close-ups.
     """
     names = [box.robot for box in robots]
     plots = [
@@ -62,7 +68,10 @@ def layout(
         ),
         row_shares=[5, 1.8, 2.6],
     )
-    close_ups = [rrb.Tabs(*(_close_up(box) for box in robots))] if robots else []
+    seen = [rrb.Spatial2DView(name=_camera_name(entity), origin=entity) for entity in pictures]
+    close_ups: list[Any] = [rrb.Tabs(*(_close_up(box) for box in robots))] if robots else []
+    if seen:
+        close_ups = [rrb.Horizontal(*close_ups, rrb.Tabs(*seen))]
     right = rrb.Vertical(
         *close_ups,
         _from_above(names),
@@ -76,6 +85,11 @@ def layout(
         auto_views=False,
         auto_layout=False,
     )
+
+
+def _camera_name(entity: str) -> str:
+    """Return what a view of pictures is called: their topic without what image_transport adds."""
+    return entity.removeprefix("/cameras/").removesuffix("/compressed").removesuffix("/image_raw")
 
 
 def _simulation(stage: Stage, robots: Sequence[str]) -> rrb.Spatial3DView:
@@ -100,7 +114,14 @@ def _world(
     return rrb.Spatial3DView(
         name=name,
         origin="/",
-        contents=["+ /world/**", "+ /estimate/**", "+ /trails/**", "+ /ros/**", *_rasters(robots)],
+        contents=[
+            "+ /world/**",
+            "+ /estimate/**",
+            "+ /trails/**",
+            "+ /ros/**",
+            "+ /cameras/**",
+            *_rasters(robots),
+        ],
         overrides=_whole_trails(robots),
         background=DARK,
         line_grid=grid,

@@ -24,7 +24,8 @@ class RunDigest:
 
     Each sample adds its topic and type (each ended by a zero byte, which ROS names cannot contain), its time,
     the length of its payload and the payload: two different sequences of samples are never the same bytes.
-    Beside it each topic has a short hash for each second.
+    Beside it each topic has a short hash for each second. What is published on demand does not count: to be
+    heard changes no run.
     """
 
     def __init__(self) -> None:
@@ -40,6 +41,8 @@ class RunDigest:
 
     def on_sample(self, sample: Sample[Any]) -> None:
         """Add one sample (a callback for `Bus.tap`)."""
+        if sample.publisher.on_demand:
+            return
         self._waiting.append(sample)
         if len(self._waiting) >= _AT_ONCE:
             self._add()

@@ -18,18 +18,22 @@ from twin.recording.rows import Rows
 if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays for it
     import rerun as rr
 
-    from twin.bridge.topics import Sample
+    from twin.bridge.topics import Publisher, Sample
     from twin.recording.channels.channel import Context
     from twin.recording.extents import RobotBox, Stage
+    from twin.recording.mounted import Mounted
     from twin.recording.poses import Poses
     from twin.sim.world import World
 
     _Take = Callable[[Sample[Any]], None]
 
 _NS = 1_000_000_000
+_PICTURE = "sensor_msgs/msg/CompressedImage"
+_CLOUD = "sensor_msgs/msg/PointCloud2"
 _COLLECTING = 0.9
 """Part of what a killed run loses during which rows are collected; in the rest of it they are written."""
 NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
+NO_CAMERAS: Mapping[str, Mounted] = MappingProxyType({})
 
 
 class _Moment(NamedTuple):
@@ -62,6 +66,8 @@ class RecordingConfig:
     """Length of a segment of a trail [m]."""
     max_particles: int = 500
     """Of a particle cloud."""
+    images_hz: float = 1.0
+    """Rate of the pictures of each camera; 0 keeps none."""
 
     def __post_init__(self) -> None:
         problems = [
@@ -69,6 +75,8 @@ class RecordingConfig:
             for name in ("poses_hz", "loss_s", "trail_step_m", "max_particles")
             if not getattr(self, name) > 0
         ]
+        if not self.images_hz >= 0:
+            problems.append(f"recording.images_hz is {self.images_hz}; valid: 0 or more")
         if problems:
             raise RecordingError("; ".join(problems))
 
@@ -107,6 +115,9 @@ class RerunSink:
         self._sources: list[Rows[Any]] = []
         self._takers: dict[tuple[str, str], _Take | None] = {}
         self._period = period_of(self._config.poses_hz)
+        self._images_period = period_of(self._config.images_hz) if self._config.images_hz else None
+        self._pictures: dict[str, int] = {}
+        """By topic: when the next picture is due [ns]."""
         self._block_ns = round(_NS * _COLLECTING * self._config.loss_s)
         self._writing_ns = round(_NS * (1.0 - _COLLECTING) * self._config.loss_s)
         self._block_end = self._written = _Moment(0, 0)
@@ -115,18 +126,25 @@ class RerunSink:
         self.mirrors = False
         """Whether the screen is that of a mirror; to be set before the file is opened."""
 
-    def declare(self, world: World, wheels: Mapping[str, Collection[str]] = NO_WHEELS) -> None:
+    def declare(
+        self,
+        world: World,
+        wheels: Mapping[str, Collection[str]] = NO_WHEELS,
+        cameras: Mapping[str, Mounted] = NO_CAMERAS,
+    ) -> None:
         """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
 
         Args:
             world: At the start.
             wheels: By robot: joints that turn without end, which are not plotted.
+            cameras: By topic: what makes the pictures there.
 
         Raises:
             RecordingError: The file cannot be written.
         """
         from twin.recording.blueprint import layout
         from twin.recording.channels.channel import Context
+        from twin.recording.channels.pictures import picture_entity
         from twin.recording.extents import Stage, robot_box
         from twin.recording.poses import Poses
         from twin.recording.shapes import declare_shapes
@@ -137,7 +155,8 @@ class RerunSink:
         frames = Frames(world.body_names)
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
         self._stage: Stage = Stage(world, shapes, self._robots)
-        blueprint = layout(self._stage, self._robots, mirrors=self.mirrors)
+        shown = [] if self._images_period is None else [picture_entity(topic) for topic in cameras]
+        blueprint = layout(self._stage, self._robots, mirrors=self.mirrors, pictures=shown)
         self._recording: rr.RecordingStream = open_recording(self._target, *self._ids, blueprint)
         self._poses: Poses = Poses(
             world.body_names,
@@ -156,6 +175,8 @@ class RerunSink:
             max_particles=self._config.max_particles,
             radii={box.robot: box.radius for box in self._robots},
             wheels=wheels,
+            cameras=cameras,
+            images_period=self._images_period,
         )
         declare_frames(self._recording, frames)
         self._set_stage()
@@ -183,6 +204,18 @@ class RerunSink:
 
         return msgtype in SHOWN_TYPES
 
+    def wants(self, publisher: Publisher[Any]) -> bool:
+        """Return whether it shows a cloud, or a picture of a camera that is due (for `Bus.wishes`)."""
+        if publisher.msgtype == _CLOUD and not self._closed:
+            return True
+        if publisher.msgtype != _PICTURE or self._images_period is None or self._closed:
+            return False
+        now_ns = publisher.node.now_ns
+        if now_ns < self._pictures.get(publisher.name, 0):
+            return False
+        self._pictures[publisher.name] = next_due(self._images_period, now_ns)
+        return True
+
     def on_tick(self, world: World) -> None:
         """Sample the poses when they are due, send the block when it is full, see that it was written.
 
@@ -209,6 +242,7 @@ class RerunSink:
         if self._world is None or self._closed:
             return
         from twin.recording.blueprint import layout
+        from twin.recording.channels.pictures import PictureChannel
         from twin.recording.stream import end_recording, handed_over, log_verdict
 
         self._closed = True
@@ -221,7 +255,9 @@ class RerunSink:
             self._stage.fit()
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-            blueprint = layout(self._stage, self._robots, self._world.time_ns, mirrors=self.mirrors)
+            shown = [source.entity for source in self._sources if isinstance(source, PictureChannel)]
+            now_ns = self._world.time_ns
+            blueprint = layout(self._stage, self._robots, now_ns, mirrors=self.mirrors, pictures=shown)
             with handed_over(blueprint):
                 self._recording.send_blueprint(blueprint)
         finally:

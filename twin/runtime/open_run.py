@@ -21,6 +21,7 @@ from twin.errors import RecordingError
 from twin.navigation.ahead import kernels_ahead
 from twin.plugins import execution
 from twin.recording.digest import RunDigest
+from twin.recording.mounted import Mounted
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
 from twin.runtime.kept_run import KeptRun
@@ -146,8 +147,7 @@ class OpenRun:
             from twin.bridge.bags.tap import BagTap
 
             bag_tap = BagTap(bag, hidden=bag_hidden_topics)
-        show = None if self._sink is None else shown(self._sink)
-        taps = [*taps, *(() if show is None else (show,))]
+        taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
         taps += [] if bag_tap is None else [bag_tap.on_sample]
         self._observers = taps
         network = network or SessionConfig(listen=outside.endpoints(listen))
@@ -166,15 +166,14 @@ class OpenRun:
                 layout=layout,
             )
             ending.callback(parts.bus.close)
-            if show is not None and self._sink is not None:
-                sink = self._sink
-                parts.bus.demand(show, lambda topic, msgtype: sink.shows(msgtype))
+            ending.callback(parts.world.close)
             if bag_tap is not None:
-                parts.bus.demand(bag_tap.on_sample, lambda topic, msgtype: True)
                 ending.callback(bag_tap.close)
                 parts.bus.arrival_taps.append(bag_tap.on_arrival)
+                parts.bus.needs.append(bag_tap.wants)
             if self._sink is not None:
                 ending.callback(self._sink.close)
+                parts.bus.wishes.append(self._sink.wants)
             if save_model is not None:
                 _save_model(parts, save_model)
             self.run = Run(scenario, parts, self._sink, outside, endless=endless)
@@ -185,7 +184,7 @@ class OpenRun:
             if self._sink is not None:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
-                self._sink.declare(parts.world, wheels)
+                self._sink.declare(parts.world, wheels, _cameras(parts))
             self._pace = kept = Pace(pace) if isinstance(pace, int | float) else pace
             if kept is not None:
                 world = parts.world
@@ -308,8 +307,9 @@ class OpenRun:
         """
         self.run.go_alone()
         bus = self.run.bus
+        bus.needs.clear()
+        bus.wishes.clear()
         bus.taps[:] = [tap for tap in bus.taps if tap not in self._observers]
-        bus.demands[:] = [each for each in bus.demands if each[0] not in self._observers]
         _left.append((self._ending.pop_all(), self._sink, self._observers))
         self._sink = self._pace = self._out = None
         self.run.wait = lambda: None
@@ -456,10 +456,21 @@ def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> Reru
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    rate, name = scenario.recording.poses_hz, f"{scenario.name}-{scenario.seed}"
+    rates = {name: getattr(scenario.recording, name) for name in ("poses_hz", "images_hz")}
+    name = f"{scenario.name}-{scenario.seed}"
     if viewer is not None:
         # Each is a recording of its own, which the viewer turns to.
-        live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
+        live = RecordingConfig(**rates, loss_s=_LIVE_S)
         return RerunSink(viewer, config=live, recording_id=f"{name}-{uuid.uuid4()}")
     assert out is not None
-    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)
+    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(**rates), recording_id=name)
+
+
+def _cameras(parts: Parts) -> dict[str, Mounted]:
+    """Return by topic what makes the pictures there."""
+    cameras = ((name, camera) for name, stack in parts.stacks.items() for camera in stack.cameras)
+    return {
+        camera.pictures: Mounted(f"{name}/{camera.spec.link}", camera.T_link_optical, camera.spec.lens)
+        for name, camera in cameras
+        if camera.pictures
+    }

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from twin.faults.schedule import FaultSchedule
     from twin.recording.sink import RerunSink
     from twin.runtime.outside import Lockstep
+    from twin.runtime.sensing import Due
     from twin.runtime.workers.workers import Workers
 
 _OBSERVED_TICKS = 5
@@ -59,9 +60,12 @@ class Run:
 
             watch_topics(self.bus, self.checks)
         self._sink = sink
-        self.schedule = SensorSchedule(
-            [sensor for stack in parts.stacks.values() for sensor in stack.sensors], self.world.timestep_ns
-        )
+        stacks = parts.stacks.values()
+        due: list[Due] = [
+            *(s for stack in stacks for s in stack.sensors),
+            *(c for stack in stacks for c in stack.cameras),
+        ]
+        self.schedule = SensorSchedule(due, self.world.timestep_ns)
         self._observation_ns = _OBSERVED_TICKS * parts.control_period_ns
         self._substeps = parts.control_period_ns // self.world.timestep_ns
         self.bus.started()

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 from twin.nodes.sensor_publishers import SensorPublisher
 from twin.periods import Period, latest, next_due
+
+if TYPE_CHECKING:
+    from twin.nodes.cameras.camera import CameraPublisher
+
+    Due: TypeAlias = SensorPublisher | CameraPublisher
 
 
 class SensorSchedule:
@@ -15,7 +21,7 @@ class SensorSchedule:
     Due times are the multiples of its period: any rate up to that of the physics works, its mean is exact.
     """
 
-    def __init__(self, sensors: Sequence[SensorPublisher], timestep_ns: int) -> None:
+    def __init__(self, sensors: Sequence[Due], timestep_ns: int) -> None:
         """Take in sensors at time 0, and tell of each how late it can be; `timestep_ns` of the physics."""
         self._sensors = tuple(sensors)
         self._timestep_ns = timestep_ns
@@ -25,7 +31,7 @@ class SensorSchedule:
         self._steps = [self._step_after(period, 0) for period in self._periods]
         self.next_step = min(self._steps, default=sys.maxsize)
         """The physics step at which a sensor fires next."""
-        self.prepare: Callable[[Sequence[SensorPublisher], int], None] | None = None
+        self.prepare: Callable[[Sequence[Due], int], None] | None = None
         """Called with the sensors that are about to fire, and the time [ns]."""
         self._tell_lateness()
 
@@ -49,10 +55,14 @@ class SensorSchedule:
         return -(-next_due(period, time_ns) // self._timestep_ns)
 
     def _tell_lateness(self) -> None:
-        """Warn, in one sentence per robot and rate, of sensors that cannot be sampled when they are due."""
+        """Warn, in one sentence per robot and rate, of sensors that cannot be sampled when they are due.
+
+        Not of cameras: the usual 30 Hz never fits, and nobody minds.
+        """
         alike: dict[tuple[str, float], list[int]] = {}
         for i, sensor in enumerate(self._sensors):
-            if latest(self._periods[i], self._timestep_ns) > 0:
+            is_camera = not isinstance(sensor, SensorPublisher)
+            if latest(self._periods[i], self._timestep_ns) > 0 and not is_camera:
                 alike.setdefault((sensor.node.namespace, sensor.sensor.spec.rate_hz), []).append(i)
         for (_, rate_hz), group in alike.items():
             names = ", ".join(self._sensors[i].sensor.spec.name for i in group)

@@ -49,7 +49,7 @@ def watch_topics(bus: Bus, checks: Sequence[Check]) -> None:
             for sample in endpoint.retained(1):
                 on_sample(sample)
     bus.tap(on_sample)
-    bus.demand(on_sample, lambda topic, msgtype: (topic, msgtype) in takers)
+    bus.needs.append(lambda publisher: _key(publisher) in takers)
     bus.arrival_taps.append(on_arrival)
 
 

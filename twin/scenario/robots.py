@@ -42,6 +42,9 @@ class RobotConfig(StrictModel):
     """Who estimates its pose; absent: nobody."""
     navigation: NavigationConfig | None = None
     """Its navigation nodes; absent: none, `{}`: all defaults."""
+    cameras: Literal["off", "optional", "required"] | None = None
+    """Whether its cameras make images. `off`: none; `optional`: none on a computer that cannot draw them;
+    `required`: on such a computer the run fails; absent: it fails if a node, a bag or a check wants one."""
     detector: DetectorEntry | None = None
     """What finds the boxes that its gripper is to take; absent: `box_faces`."""
 

@@ -92,3 +92,5 @@ class RecordingConfig(StrictModel):
     """Whether to write one."""
     poses_hz: Annotated[Hertz, Positive] = 25.0
     """Rate of the poses [Hz], at most one per control period."""
+    images_hz: Annotated[Hertz, NotNegative] = 1.0
+    """Rate of the pictures of each camera [Hz], at most the camera's; 0: none."""

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import SimulationError
 from twin.geometry import Array, Pose3
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
+from twin.sim.canvas import Canvas
 
-BACKENDS = {"egl": "EGL", "osmesa": "OSMesa"}
-"""Modules of MuJoCo that draw without a display, and the library of each."""
 _SKY, _HORIZON = (0.55, 0.66, 0.78), (0.93, 0.95, 0.97)
 
 
@@ -81,59 +75,6 @@ def take(solids: Sequence[Solid], camera: Camera, width: int = 640, height: int 
         return canvas.draw(scene)
     finally:
         canvas.close()
-
-
-class Canvas:
-    """What OpenGL draws scenes on, without a display.
-
-    `mujoco.Renderer` has the one that was chosen when MuJoCo was imported, which by default wants a display.
-    """
-
-    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
-        """Make one for scenes of a model, of a size [pixels].
-
-        Raises:
-            SimulationError: There is no OpenGL without a display here.
-        """
-        self._opengl, self._frame = _opengl(width, height), mujoco.MjrRect(0, 0, width, height)
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-
-    def draw(self, scene: mujoco.MjvScene) -> NDArray[np.uint8]:
-        """Return a picture, shape (height, width, 3)."""
-        self._opengl.make_current()
-        picture = np.empty((self._frame.height, self._frame.width, 3), np.uint8)
-        mujoco.mjr_render(self._frame, scene, self._context)
-        mujoco.mjr_readPixels(picture, None, self._frame, self._context)
-        return np.ascontiguousarray(picture[::-1])
-
-    def close(self) -> None:
-        """Free what the graphics driver holds. Harmless when repeated."""
-        self._opengl.make_current()
-        self._context.free()
-        self._opengl.free()
-
-
-def _opengl(width: int, height: int) -> Any:
-    try:
-        context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
-        context.make_current()
-    except SimulationError:
-        raise
-    except Exception as fault:  # of three libraries, each with its own kinds
-        raise SimulationError(f"MuJoCo finds no OpenGL without a display ({fault})") from fault
-    return context
-
-
-def _backend() -> str:
-    if sys.platform == "darwin":
-        return "cgl"
-    for name, library in BACKENDS.items():
-        if ctypes.util.find_library(library):
-            return name
-    raise SimulationError(
-        "MuJoCo needs EGL or OSMesa to draw without a display (`apt-get install libegl1` or `libosmesa6`)"
-    )
 
 
 def _add(spec: mujoco.MjSpec, name: str, solid: Solid) -> None:

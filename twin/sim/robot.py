@@ -12,6 +12,7 @@ from twin.geometry import Pose2, Pose3
 from twin.models.description import RobotDescription
 
 if TYPE_CHECKING:
+    from twin.sim.cameras.camera import Camera
     from twin.sim.hardware import Hardware
     from twin.sim.sensors import SampledSensor
 
@@ -44,6 +45,7 @@ class RobotHandle:
     description: RobotDescription
     hardware: Hardware
     sensors: tuple[SampledSensor, ...]
+    cameras: tuple[Camera, ...]
     data: mujoco.MjData
     mocap_id: int
     """Of the root link in `data`; negative without a kinematic base."""

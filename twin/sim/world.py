@@ -29,6 +29,8 @@ from twin.sim.work import StepMeter, StepWatch, WorkMeter
 
 if TYPE_CHECKING:
     from twin.sim.alterations import Alterations
+    from twin.sim.cameras.camera import Camera
+    from twin.sim.cameras.eyes import Eyes
 
 
 class World:
@@ -265,7 +267,28 @@ class World:
 
     def model_to_see(self) -> mujoco.MjModel:
         """Return the same world with what is seen only, to draw it at this one's `qpos` and `mocap_pos`."""
-        return build_spec(self.scene, self._placements, self.physics).compile()
+        return self.spec_to_see().compile()
+
+    def spec_to_see(self) -> mujoco.MjSpec:
+        """Return the model to see before it is compiled, for those who add something to it."""
+        return build_spec(self.scene, self._placements, self.physics)
+
+    @cached_property
+    def eyes(self) -> Eyes:
+        """What draws what cameras see.
+
+        Raises:
+            SimulationError: Nothing can be drawn on this computer.
+        """
+        from twin.sim.cameras.eyes import Eyes
+
+        return Eyes(self)
+
+    def close(self) -> None:
+        """Free what the graphics driver holds for cameras. Harmless when repeated."""
+        eyes = self.__dict__.pop("eyes", None)
+        if eyes is not None:
+            eyes.close()
 
     def state_digest(self) -> bytes:
         """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""
@@ -333,9 +356,19 @@ class World:
             description=description,
             hardware=hardware,
             sensors=sensors,
+            cameras=self._bind_cameras(placement) if description.cameras else (),
             data=self.data,
             mocap_id=int(root.mocapid[0]),
             free_joint=self._free_joint(root.id),
+        )
+
+    def _bind_cameras(self, placement: RobotPlacement) -> tuple[Camera, ...]:
+        from twin.sim.cameras.camera import Camera
+
+        name, description = placement.name, placement.conversion.description
+        return tuple(
+            Camera(spec, Mount(world=self, robot=name, link=spec.link, source=description.source))
+            for spec in description.cameras
         )
 
     def _free_joint(self, body: int) -> tuple[int, int] | None:

@@ -171,7 +171,6 @@ UNSIMULATED = {
     "altimeter": on("a", "<sensor name='s' type='altimeter'/>"),
     "displaced": on("a", "<sensor name='s' type='imu'><pose>0 0 1 0 0 0</pose></sensor>"),
     "mu2": on("a", "<mu1>1</mu1><mu2>0.1</mu2>"),
-    "camera": on("a", f"<sensor name='s' type='camera'>{CAMERA}</sensor>"),
     "proposed sensor": f"<sensor name='s' type='camera'><parent link='a'/>{CAMERA}</sensor>",
 }  # fmt: skip
 

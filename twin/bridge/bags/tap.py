@@ -13,7 +13,7 @@ from twin.bridge.bags.origins import Origins
 from twin.bridge.bags.writer import BagConfig, BagWriter
 from twin.bridge.bus import Bus
 from twin.bridge.graph import Graph, is_hidden
-from twin.bridge.topics import Sample, Subscription
+from twin.bridge.topics import Publisher, Sample, Subscription
 from twin.bridge.wire.external import Arrival
 from twin.errors import RecordingError
 
@@ -69,6 +69,10 @@ class BagTap:
         self._names[node.token.node_id] = node.fully_qualified_name
         message = BagMessage(sample.topic, sample.payload, time_ns, time_ns, sample.sequence)
         self._record(message, sample.msgtype, node.token.node_id)
+
+    def wants(self, publisher: Publisher[Any]) -> bool:
+        """Return whether it records a topic (for `Bus.needs`)."""
+        return self._hidden or not is_hidden(publisher.name)
 
     def on_arrival(self, arrival: Arrival) -> None:
         """Record one message from outside that a node subscribes to (for `Bus.arrival_taps`), only once.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import zenoh
 
@@ -39,6 +39,7 @@ class MirroredNode:
 class MirroredPublisher:
     """A publisher of another process, as taps see it."""
 
+    on_demand: ClassVar[bool] = False
     node: MirroredNode
     name: str
     """Absolute name of the topic."""

@@ -116,13 +116,22 @@ class Node(NodeParameters, NodeGraph):
             )
         return self._names.resolve(name)
 
-    def create_publisher(self, msg_type: type[M], topic: str, qos: QoS | int = 10) -> Publisher[M]:
-        """Offer a topic; a number as QoS is the depth of a reliable, volatile one.
+    def create_publisher(
+        self, msg_type: type[M], topic: str, qos: QoS | int = 10, *, on_demand: bool = False
+    ) -> Publisher[M]:
+        """Offer a topic.
+
+        Args:
+            msg_type: Class of the messages.
+            topic: Name, which is resolved and remapped.
+            qos: What is promised; a number is the depth of a reliable, volatile one.
+            on_demand: Whether messages are published only while its `is_wanted` holds.
 
         Raises:
             BridgeError: an invalid name.
         """
-        return self.add_endpoint(Publisher(self, msg_type, self.resolve_name(topic), as_qos(qos)))
+        name = self.resolve_name(topic)
+        return self.add_endpoint(Publisher(self, msg_type, name, as_qos(qos), on_demand=on_demand))
 
     def create_subscription(
         self,

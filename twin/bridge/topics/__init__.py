@@ -97,9 +97,13 @@ class Endpoint:
 class Publisher(Endpoint, Generic[M]):
     """Publishes messages of one type on a topic."""
 
-    def __init__(self, node: Node, msg_type: type[M] | str, name: str, qos: QoS) -> None:
+    def __init__(
+        self, node: Node, msg_type: type[M] | str, name: str, qos: QoS, *, on_demand: bool = False
+    ) -> None:
         self.codec: Codec[M] = codec(msg_type)
         super().__init__(node, "MP", name, self.codec.msgtype, qos)
+        self.on_demand = on_demand
+        """Whether it publishes only what somebody wants: then that is no part of what the run was."""
         self._bus = node.bus
         self._by_reference = node.bus.savings.by_reference
         self.msgtype = self.codec.msgtype
@@ -111,15 +115,8 @@ class Publisher(Endpoint, Generic[M]):
         self._retained = deque[Sample[M]](maxlen=min(qos.depth, _KEEP_ALL))
         if self._latched and self._listeners is not None:
             self._listeners.latched.append(self)
-        self.on_demand = False
-        """Whether it publishes only if somebody wants it; then taps are shown it that demand it."""
         self._declared.append(self._zenoh)
         self.announce()
-
-    @property
-    def is_wanted(self) -> bool:
-        """Whether somebody listens, or demands the topic (`Bus.demand`)."""
-        return self.has_subscribers or bool(self._bus.demanding(self.name, self.msgtype))
 
     @property
     def has_subscribers(self) -> bool:
@@ -129,6 +126,17 @@ class Publisher(Endpoint, Generic[M]):
         if self._listeners is not None and self._listeners.is_direct:
             return bool(self._listeners.receivers)
         return bool(self._zenoh.matching_status.matching)
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether somebody who takes part in the run wants what is published on demand now."""
+        local = self._bus.in_process.listeners(self.key).receivers
+        return bool(local) or any(appetite(self) for appetite in self._bus.needs)
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether anybody does, here or elsewhere."""
+        return self.is_needed or self.has_subscribers or any(appetite(self) for appetite in self._bus.wishes)
 
     def publish(self, message: M, *, frozen: bool = False) -> None:
         """Publish at the clock's time.
@@ -175,12 +183,11 @@ class Publisher(Endpoint, Generic[M]):
         receivers = None
         if listeners is not None and listeners.is_direct and get_ident() == bus.thread:
             receivers = listeners.receivers
-        taps = bus.demanding(self.name, self.msgtype) if self.on_demand else bus.taps
         latched = self._latched and (receivers is not None or listeners is None)  # Zenoh's: for a fork
         # What stays as it is, and nobody is given, need not be settled.
-        if receivers or latched or (taps and not frozen):
+        if receivers or latched or (bus.taps and not frozen):
             sample.settle(frozen)
-        for tap in taps:
+        for tap in bus.taps:
             tap(sample)
         if latched:
             self._retained.append(sample)
@@ -188,7 +195,7 @@ class Publisher(Endpoint, Generic[M]):
             for receiver in receivers:
                 bus.deliver(receiver, sample)
         # Asking who listens costs more than a put that nobody hears, once the payload is there.
-        elif taps or self.has_subscribers:
+        elif bus.taps or self.has_subscribers:
             self._put(sample)
 
     def relay(self, sequence: int, time_ns: int, payload: bytes) -> None:

@@ -10,10 +10,11 @@ from twin.models.description import Link, RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.models.sensors import SENSORS, plugin_of
 from twin.models.specs import CameraSpec, SensorSpec
+from twin.models.urdf.cameras import CAMERA
 from twin.models.urdf.document import Element
 from twin.models.urdf.drives import CONTROLLER, LEFT, RIGHT, TORQUES, is_drive, library_of
 from twin.models.urdf.gazebo import MU1, MU2, SELF_COLLIDE, colour_of, flag_in, number_in, value_of
-from twin.models.urdf.sensors import CAMERA, PLUGIN_IMU, kind_of
+from twin.models.urdf.sensors import PLUGIN_IMU, kind_of
 
 ELSEWHERE = "not in robot.xml; report.json has it"
 TAGS: Mapping[str, Fate] = MappingProxyType(
@@ -34,6 +35,12 @@ OF_CAMERAS: Mapping[str, Fate] = MappingProxyType(
         "image/height": ("kept", "resolution"),
         "clip/near": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
         "clip/far": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
+        "image/format": ("dropped", ELSEWHERE),
+        "optical_frame_id": ("dropped", ELSEWHERE),
+        **{
+            f"distortion/{name}": ("dropped", f"MuJoCo has no lenses; {ELSEWHERE}")
+            for name in ("k1", "k2", "k3", "p1", "p2")
+        },
     }
 )
 WRAPPERS = ("ray", "lidar", "imu", "camera", "contact")

@@ -8,11 +8,12 @@ from twin.errors import nearest
 from twin.models.checks.diagnostic import Diagnostic, finding, finding_in, read_source
 from twin.models.description import RobotDescription
 from twin.models.sensors import SENSORS, plugin_of
+from twin.models.urdf.cameras import CAMERA, camera_fault, lenses
 from twin.models.urdf.commands import HARDWARE, INTERFACES, command_interface, transmissions
 from twin.models.urdf.document import Element, Report, first
 from twin.models.urdf.drives import is_drive, library_of
 from twin.models.urdf.gazebo import MU1, MU2, NUMBERS, extensions_of, number_in, value_of
-from twin.models.urdf.sensors import CAMERA, PLUGIN_IMU, camera_fault, kind_of, lenses
+from twin.models.urdf.sensors import PLUGIN_IMU, kind_of
 
 OWN_PLUGINS = ("joint_state_publisher", "joint-state-publisher-system", "_control", "_control-system")
 """Ends of the names of libraries whose work twin's own nodes do: joint states, and running controllers."""
@@ -103,9 +104,6 @@ def _camera(sensor: Element, link: str, what: str) -> Iterator[Found]:
     for fault in faults:
         if fault:
             yield "not-simulated", sensor, f"{what}: {fault}", "correct it"
-        else:
-            message = f"{what} is a camera in robot.xml; twin renders no images"
-            yield "not-simulated", sensor, message, "render them from robot.xml with MuJoCo"
     if "optical" in link:
         message = f"{what} looks along +x of '{link}', which looks by its name along +z"
         fix = "put it on the camera's link, and name the optical frame in <optical_frame_id>"

@@ -12,6 +12,7 @@ import rerun as rr
 from twin.geometry import Pose3
 from twin.periods import Period
 from twin.recording.frames import Frames
+from twin.recording.mounted import Mounted
 from twin.recording.rows import Row, Rows
 
 if TYPE_CHECKING:
@@ -38,6 +39,10 @@ class Context:
     """Of robots, on the floor [m]."""
     wheels: Mapping[str, Collection[str]]
     """By robot: joints that are not worth a plot, as they turn without end."""
+    cameras: Mapping[str, Mounted]
+    """By topic: what makes the pictures there."""
+    images_period: Period | None
+    """At its multiples [ns] pictures are kept; None: at no time."""
     grids: dict[str, GridChannel] = field(default_factory=dict)
     """By topic: those that are open."""
 

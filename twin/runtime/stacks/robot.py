@@ -21,6 +21,7 @@ from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.localisation import build_localisation
 
 if TYPE_CHECKING:
+    from twin.nodes.cameras.camera import CameraPublisher
     from twin.nodes.navigation.bt_navigator import BtNavigatorNode
     from twin.nodes.navigation.localisation.ekf import EkfNode
     from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig
@@ -41,6 +42,7 @@ class RobotStack:
         base_frame = drive.base_frame if drive else description.root
         self.frames = Frames(odom=drive.odometry_frame if drive else "odom", base=base_frame)
         self.sensors = [SensorPublisher(bus, sensor, namespace=namespace) for sensor in handle.sensors]
+        self.cameras = _cameras(context)
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
@@ -163,3 +165,16 @@ class RobotStack:
 
         detector = None if context.config.detector is None else context.config.detector.build()
         ToteDetectorNode(bus, self.robot_pose, detector, namespace=context.namespace)
+
+
+def _cameras(context: StackContext) -> list[CameraPublisher]:
+    cameras, need = context.handle.cameras, context.config.cameras
+    if not cameras or need == "off":
+        return []
+    from twin.nodes.cameras.camera import CameraPublisher
+
+    description, namespace = context.handle.description, context.hardware_namespace
+    return [
+        CameraPublisher(context.bus, camera, description, namespace=namespace, need=need)
+        for camera in cameras
+    ]

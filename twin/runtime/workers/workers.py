@@ -21,8 +21,8 @@ from twin.runtime.workers.stand_ins import Belief, Scanned, Told
 from twin.sensors.lidar import Lidar
 
 if TYPE_CHECKING:
-    from twin.nodes.sensor_publishers import SensorPublisher
     from twin.runtime.run import Run
+    from twin.runtime.sensing import Due
     from twin.runtime.stacks.robot import RobotStack
 
 
@@ -103,7 +103,7 @@ class Workers:
             worker.wait()
         self._crew.close()
 
-    def _scan(self, sensors: Sequence[SensorPublisher], time_ns: int) -> None:
+    def _scan(self, sensors: Sequence[Due], time_ns: int) -> None:
         """Let workers sample those of their lidars that are about to fire."""
         asked: dict[Worker, list[tuple[tuple[str, int], Scanned]]] = {}
         for sensor in sensors:

@@ -1,0 +1,184 @@
+"""What a camera sees is where its lens says, as far as rays say, and the same each time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.drawing import needs_opengl
+from tests.sim.cameras.conftest import BALL, BALL_AT, BALL_RADIUS, EYE, WALL, Look
+from twin.errors import ModelError
+from twin.geometry import Pose3
+from twin.models.shapes import Box
+from twin.sim.scene import Shape, StaticBody
+
+pytestmark = needs_opengl
+LENS = "<distortion><k1>-0.25</k1><k2>0.1</k2><k3>0.01</k3><p1>0.002</p1><p2>-0.001</p2></distortion>"
+
+
+def outline(centre: np.ndarray, radius: float) -> np.ndarray:
+    """Return points of the edge at which a sphere is seen, in the optical frame, shape (n, 3)."""
+    d2 = centre @ centre
+    share = 1.0 - radius**2 / d2
+    side = np.cross(centre, (0.0, 1.0, 0.0))
+    side /= np.linalg.norm(side)
+    other = np.cross(centre, side) / np.sqrt(d2)
+    turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)[:, None]
+    return share * centre + radius * np.sqrt(share) * (np.cos(turn) * side + np.sin(turn) * other)
+
+
+def middle(polygon: np.ndarray) -> np.ndarray:
+    """Return the centre of the area of a polygon, shape (n, 2)."""
+    after = np.roll(polygon, -1, axis=0)
+    cross = polygon[:, 0] * after[:, 1] - after[:, 0] * polygon[:, 1]
+    return ((polygon + after) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
+
+
+def opencv_projection(points: np.ndarray, k: np.ndarray, d: tuple[float, ...]) -> np.ndarray:
+    """Project as the formulas of OpenCV's calib3d page say."""
+    k1, k2, p1, p2, k3 = d
+    x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
+    r2 = x**2 + y**2
+    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2)
+    v = y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
+    return np.stack((k[0, 0] * u + k[0, 2], k[1, 1] * v + k[1, 2]), axis=1)
+
+
+@pytest.mark.parametrize("inside", ["", LENS], ids=["pinhole", "lens"])
+def test_a_ball_is_seen_where_the_camera_info_says(camera_at: Look, inside: str) -> None:
+    camera = camera_at(BALL, inside=inside)
+    image = camera.look(0).colours
+    assert image is not None
+    red = (image[..., 0].astype(int) - image[..., 1]) > 60
+    v, u = np.nonzero(red)
+    assert len(u) > 200
+    ahead, left, up = np.array(BALL_AT) - EYE
+    lens = camera.spec.lens
+    edge = opencv_projection(
+        outline(np.array([-left, -up, ahead]), BALL_RADIUS), lens.matrix, lens.distortion
+    )
+    assert np.abs(np.array([u.mean(), v.mean()]) - middle(edge)).max() < 0.2
+
+
+def test_the_depth_of_a_wall_is_what_rays_measure(camera_at: Look) -> None:
+    camera = camera_at(WALL)
+    depth = camera.look(0, colours=False, depth=True).depth
+    assert depth is not None
+    world, hit = camera.mount.world, np.full((120, 160), np.nan)
+    rays = camera.spec.lens.rays()
+    for row in range(0, 120, 7):
+        for column in range(0, 160, 7):
+            x, y = rays[row, column]
+            ray = np.array([1.0, -x, -y])
+            length = mujoco.mj_ray(
+                world.model, world.data, np.array(EYE), ray, None, 1, -1, np.zeros(1, np.int32)
+            )
+            hit[row, column] = length  # in lengths of the ray, whose x is 1: along the axis
+    cast = np.isfinite(hit)
+    assert cast.sum() > 350
+    error = np.abs(depth - hit)[cast]
+    assert np.median(error) < 1e-5
+    assert error.max() < 1e-3
+    assert np.median(np.abs(depth[:60] - 3.0)) < 1e-5
+
+
+def test_there_is_no_depth_in_the_sky_and_beyond_the_far_plane(camera_at: Look) -> None:
+    view = camera_at(BALL, inside="<depth_camera><clip><far>1.5</far></clip></depth_camera>").look(
+        0, depth=True
+    )
+    assert view.depth is not None
+    assert np.isnan(view.depth[:60]).all()  # the ball is 2 m away
+    assert 0.5 < np.nanmin(view.depth) < np.nanmax(view.depth) <= 1.5
+
+
+def test_a_camera_inside_a_wall_goes_on(camera_at: Look) -> None:
+    around = StaticBody(
+        name="around",
+        T_world_body=Pose3.from_xyz_rpy(EYE),
+        shapes=(Shape(geometry=Box(size=(0.5, 0.5, 0.5))),),
+    )
+    view = camera_at(around, WALL).look(0, depth=True)
+    assert view.colours is not None
+    assert view.depth is not None
+    assert view.depth.shape == (120, 160)
+
+
+def test_encodings_are_of_the_same_picture(camera_at: Look) -> None:
+    rgb, bgr, grey = (camera_at(BALL, format=name).look(0).colours for name in ("R8G8B8", "B8G8R8", "L8"))
+    assert rgb is not None
+    assert bgr is not None
+    assert grey is not None
+    assert (bgr == rgb[..., ::-1]).all()
+    assert np.abs(grey - rgb @ [0.299, 0.587, 0.114]).max() <= 0.5
+
+
+NOISE = "<noise><type>gaussian</type><mean>0.02</mean><stddev>0.01</stddev></noise>"
+
+
+def test_noise_is_of_the_seed_and_the_time(camera_at: Look) -> None:
+    plain = camera_at(WALL).look(0).colours
+    camera, other = camera_at(WALL, inside=NOISE), camera_at(WALL, inside=NOISE, seed=1)
+    first, again = camera.look(0).colours, camera.look(0).colours
+    later, of_other = camera.look(100_000_000).colours, other.look(0).colours
+    assert first is not None
+    assert plain is not None
+    assert again is not None
+    assert (first == again).all()
+    assert (first != later).any()
+    assert (first != of_other).any()
+    off = (first.astype(float) - plain)[:60]
+    assert abs(off.mean() - 0.02 * 255) < 0.1
+    assert abs(off.std() - 0.01 * 255) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("noise", "sigma"),
+    [
+        ("<type>kinect</type>", 1.425e-3 * 9.0),
+        (
+            "<type>realsense</type><subpixel>0.1</subpixel><baseline>0.07</baseline>",
+            9.0 * 0.1 / (80.0 / np.tan(0.6) * 0.07),
+        ),
+    ],
+    ids=["kinect", "realsense"],
+)
+def test_depth_is_as_wrong_as_the_models_say(camera_at: Look, noise: str, sigma: float) -> None:
+    inside = f"<depth_camera><noise>{noise}</noise></depth_camera>"
+    depth = camera_at(WALL, inside=inside).look(0, colours=False, depth=True).depth
+    assert depth is not None
+    wall = depth[:60].astype(float)
+    assert abs(wall.mean() - 3.0) < 0.05 * sigma
+    assert abs(wall.std() / sigma - 1.0) < 0.05
+
+
+def test_a_camera_faster_than_the_physics_is_refused(camera_at: Look) -> None:
+    with pytest.raises(ModelError, match="samples at 600 Hz, faster than the physics"):
+        camera_at(rate=600)
+
+
+def test_another_process_sees_the_same_with_egl_as_with_osmesa(camera_at: Look) -> None:
+    """OSMesa is taken where it is installed."""
+    view = camera_at(BALL, inside=NOISE).look(0, depth=True)
+    assert view.colours is not None
+    assert view.depth is not None
+    code = (
+        "import sys; from tests.sim.cameras.conftest import BALL, built;"
+        f"view = built(BALL, inside='{NOISE}').look(0, depth=True);"
+        "sys.stdout.buffer.write(view.colours.tobytes() + view.depth.tobytes())"
+    )
+    # What MuJoCo's EGL leaves there would keep OSMesa out.
+    inherited = {name: value for name, value in os.environ.items() if name != "PYOPENGL_PLATFORM"}
+    other = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**inherited, "MUJOCO_GL": "osmesa", "PYTHONPATH": str(Path(__file__).parents[3])},
+        capture_output=True,
+        check=True,
+    )
+    assert other.stdout == view.colours.tobytes() + view.depth.tobytes()

@@ -1,0 +1,1 @@
+"""Cameras as nodes: images, what lens they have, and clouds of points."""

@@ -1,0 +1,118 @@
+"""What a camera sees as messages; an image is rows from the top, pixels from the left."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.bridge.msgs import CameraInfo, CompressedImage, Header, Image, PointCloud2, PointField, new
+from twin.models.lens import Lens
+
+_QUALITY = 80
+"""Of JPEG pictures, as image_transport's default."""
+_LONGEST_MM = 65535
+_XYZ = ("x", "y", "z")
+
+
+def image(header: Header, pixels: NDArray[Any], encoding: str) -> Image:
+    """Return an image of pixels, shape (height, width) or (height, width, channels)."""
+    height, width = pixels.shape[:2]
+    return Image(
+        header=header,
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=pixels[0].nbytes,
+        data=_bytes(pixels),
+    )
+
+
+def depth_image(header: Header, z: NDArray[np.float32], encoding: str) -> Image:
+    """Return depths [m], nan where there are none, as `32FC1`, or as `16UC1`: millimetres, or 0 (REP-118)."""
+    if encoding == "32FC1":
+        return image(header, z, encoding)
+    millimetres = np.rint(np.nan_to_num(z, nan=0.0) * 1e3)
+    millimetres[millimetres > _LONGEST_MM] = 0.0
+    return image(header, millimetres.astype(np.uint16), encoding)
+
+
+def jpeg(header: Header, pixels: NDArray[np.uint8], encoding: str) -> CompressedImage:
+    """Return an image as JPEG, called as image_transport calls it."""
+    from PIL import Image as Pillow
+
+    grey = encoding == "mono8"
+    file = BytesIO()
+    Pillow.fromarray(pixels if grey else rgb(pixels, encoding)).save(file, "jpeg", quality=_QUALITY)
+    return CompressedImage(
+        header=header,
+        format=f"{encoding}; jpeg compressed {'mono8' if grey else 'bgr8'}",
+        data=np.frombuffer(file.getvalue(), np.uint8),
+    )
+
+
+def rgb(pixels: NDArray[np.uint8], encoding: str) -> NDArray[np.uint8]:
+    """Return pixels of an encoding as red, green and blue, shape (height, width, 3)."""
+    if encoding == "mono8":
+        return np.repeat(pixels[..., None], 3, axis=-1)
+    return pixels[..., ::-1] if encoding == "bgr8" else pixels
+
+
+def camera_info(header: Header, lens: Lens) -> CameraInfo:
+    """Return how a camera projects (REP-104)."""
+    info = new(CameraInfo)
+    info.header, info.height, info.width = header, lens.height, lens.width
+    info.distortion_model, info.d = "plumb_bob", np.array(lens.distortion)
+    info.k, info.r = lens.matrix.ravel(), np.eye(3).ravel()
+    info.p = np.hstack((lens.matrix, np.zeros((3, 1)))).ravel()
+    return info
+
+
+def cloud(
+    header: Header, lens: Lens, z: NDArray[np.float32], rgb: NDArray[np.uint8] | None = None
+) -> PointCloud2:
+    """Return a point for each pixel, row by row, nan where there is no depth; in the optical frame.
+
+    Args:
+        header: Of the image.
+        lens: Through which it was taken.
+        z: Depths [m], shape (height, width).
+        rgb: Colours of the same pixels, shape (height, width, 3).
+    """
+    names = _XYZ if rgb is None else (*_XYZ, "rgb")
+    points = np.empty((*z.shape, len(names)), np.float32)
+    points[..., :2] = rays(lens) * z[..., None]
+    points[..., 2] = z
+    points[np.isnan(z), :3] = np.nan
+    if rgb is not None:
+        red, green, blue = (rgb[..., i].astype(np.uint32) for i in range(3))
+        points[..., 3] = (red << 16 | green << 8 | blue).view(np.float32)
+    height, width = z.shape
+    step = points[0, 0].nbytes
+    return PointCloud2(
+        header=header,
+        height=height,
+        width=width,
+        fields=[PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate(names)],
+        is_bigendian=False,
+        point_step=step,
+        row_step=width * step,
+        data=_bytes(points),
+        is_dense=bool(np.isfinite(z).all()),
+    )
+
+
+@lru_cache(maxsize=16)
+def rays(lens: Lens) -> NDArray[np.float32]:
+    """Return the x and y on the plane z = 1 of what each pixel sees, shape (height, width, 2)."""
+    return lens.rays().astype(np.float32)
+
+
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    data = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+    data.flags.writeable = False
+    return data

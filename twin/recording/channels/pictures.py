@@ -1,0 +1,80 @@
+"""Compressed images: as pictures, and where their camera is if that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from twin.periods import next_due
+from twin.recording.channels.channel import Channel, Context
+from twin.recording.columns import Chunk, Component, sim_time
+from twin.recording.mounted import Mounted
+
+if TYPE_CHECKING:
+    from twin.bridge.topics import Sample
+
+_BLOB, _MEDIA_TYPE = (Component(rr.EncodedImage, name) for name in ("blob", "media_type"))
+_PLANE_M = 0.3
+"""Distance from the camera at which a picture hangs in the view of space [m]."""
+
+
+def picture_entity(topic: str) -> str:
+    """Return where pictures of a topic are: not below `/ros`, which the map's view shows."""
+    return f"/cameras{topic}"
+
+
+class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
+    """sensor_msgs/CompressedImage: JPEG and PNG, at the recording's own rate."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        """Hang the picture before its camera, if the robot has one of that topic."""
+        super().__init__(context, namespace, topic)
+        self.entity = picture_entity(topic)
+        self._next_ns = 0
+        camera = context.cameras.get(topic)
+        if camera is not None:
+            self._mount(camera)
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Keep a picture that is due."""
+        period, message = self.context.images_period, sample.message
+        kind = next((kind for kind in ("jpeg", "png") if kind in message.format), None)
+        if period is None or kind is None or sample.time_ns < self._next_ns:
+            return
+        self._next_ns = next_due(period, sample.time_ns)
+        self.rows.append((sample.time_ns, f"image/{kind}", np.array(message.data, np.uint8)))
+
+    def chunks(self, rows: list[tuple[int, str, NDArray[np.uint8]]]) -> Iterator[Chunk]:
+        """Yield the pictures."""
+        times, kinds, files = zip(*rows, strict=True)
+        yield self.entity, sim_time(times), (_BLOB.column(list(files)), _MEDIA_TYPE.column(list(kinds)))
+
+    def _mount(self, camera: Mounted) -> None:
+        lens, pose, place = camera.lens, camera.T_body_optical, f"camera of {self.topic}"
+        w, *xyz = pose.quat_wxyz.tolist()
+        self.recording.log(
+            f"{self.entity}/camera",
+            rr.Transform3D(
+                translation=pose.xyz,
+                quaternion=rr.Quaternion(xyzw=[*xyz, w]),
+                parent_frame=camera.body,
+                child_frame=place,
+            ),
+            static=True,
+        )
+        self.recording.log(
+            self.entity,
+            rr.Pinhole(
+                image_from_camera=lens.matrix,
+                resolution=[lens.width, lens.height],
+                parent_frame=place,
+                child_frame=f"image of {self.topic}",
+                image_plane_distance=_PLANE_M,
+            ),
+            rr.CoordinateFrame(f"image of {self.topic}"),
+            static=True,
+        )

@@ -1,0 +1,1 @@
+"""Cameras in a compiled world: what they see, drawn by MuJoCo without a display."""

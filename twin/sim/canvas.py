@@ -1,0 +1,113 @@
+"""What OpenGL draws on, without a display."""
+
+from __future__ import annotations
+
+import atexit
+import ctypes.util
+import os
+import sys
+import weakref
+from importlib import import_module
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import SimulationError
+
+BACKENDS = {"egl": "EGL", "osmesa": "OSMesa"}
+"""Modules of MuJoCo that draw without a display, and the library of each."""
+PACKAGES = "`apt-get install libegl1 libgl1-mesa-dri`, or `libosmesa6` and MUJOCO_GL=osmesa"
+"""Where both are."""
+
+_FLAGS = mujoco.mjtRndFlag
+_PLAIN = {_FLAGS.mjRND_SEGMENT: 1, _FLAGS.mjRND_IDCOLOR: 1}
+"""For a picture of distances: no light, and no sky, which is a box before the far plane."""
+
+
+class Canvas:
+    """What OpenGL draws scenes on, without a display.
+
+    `mujoco.Renderer` has the one that was chosen when MuJoCo was imported, which by default wants a display.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+        """Make one for scenes of a model, of a size [pixels] that no picture exceeds.
+
+        Raises:
+            SimulationError: There is no OpenGL without a display here.
+        """
+        self._opengl, self._size = _opengl(width, height), (width, height)
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        # At the end of the process before MuJoCo's EGL ends, which is registered already.
+        self._free = weakref.finalize(self, _free, self._opengl, self._context, os.getpid())
+        self._free.atexit = False
+        atexit.register(self._free)
+
+    def draw(
+        self, scene: mujoco.MjvScene, width: int | None = None, height: int | None = None
+    ) -> NDArray[np.uint8]:
+        """Return a picture, by default as large as the canvas, shape (height, width, 3)."""
+        frame = self._frame(width, height)
+        picture = np.empty((frame.height, frame.width, 3), np.uint8)
+        self._opengl.make_current()
+        mujoco.mjr_render(frame, scene, self._context)
+        mujoco.mjr_readPixels(picture, None, frame, self._context)
+        return np.ascontiguousarray(picture[::-1])
+
+    def nearness(
+        self, scene: mujoco.MjvScene, width: int | None = None, height: int | None = None
+    ) -> NDArray[np.float32]:
+        """Return OpenGL's depth, shape (height, width): 0 in the sky, 1 at the near plane."""
+        frame = self._frame(width, height)
+        picture = np.empty((frame.height, frame.width), np.float32)
+        before = scene.flags.copy()
+        for flag, value in _PLAIN.items():
+            scene.flags[flag] = value
+        self._opengl.make_current()
+        mujoco.mjr_render(frame, scene, self._context)
+        mujoco.mjr_readPixels(None, picture, frame, self._context)
+        scene.flags[:] = before
+        return picture[::-1]
+
+    def _frame(self, width: int | None, height: int | None) -> mujoco.MjrRect:
+        return mujoco.MjrRect(0, 0, width or self._size[0], height or self._size[1])
+
+    def close(self) -> None:
+        """Free what the graphics driver holds. Harmless when repeated."""
+        atexit.unregister(self._free)
+        self._free()
+
+
+def _free(opengl: Any, context: mujoco.MjrContext, process: int) -> None:
+    """Free what the graphics driver holds for the process; a fork of it has nothing there."""
+    if os.getpid() == process:
+        opengl.make_current()
+        context.free()
+        opengl.free()
+
+
+def _opengl(width: int, height: int) -> Any:
+    try:
+        context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
+        context.make_current()
+    except SimulationError:
+        raise
+    except Exception as fault:  # of three libraries, each with its own kinds
+        raise SimulationError(
+            f"MuJoCo finds no OpenGL without a display ({fault}); it needs EGL or OSMesa ({PACKAGES})"
+        ) from fault
+    return context
+
+
+def _backend() -> str:
+    if sys.platform == "darwin":
+        return "cgl"
+    wish = os.environ.get("MUJOCO_GL", "").lower()
+    for name in sorted(BACKENDS, key=lambda name: name != wish):
+        if ctypes.util.find_library(BACKENDS[name]):
+            return name
+    raise SimulationError(f"MuJoCo needs EGL or OSMesa to draw without a display ({PACKAGES})")
