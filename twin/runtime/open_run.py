@@ -21,6 +21,7 @@ from twin.errors import RecordingError
 from twin.navigation.ahead import kernels_ahead
 from twin.plugins import execution
 from twin.recording.digest import RunDigest
+from twin.recording.live_screen import LATE_S
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
 from twin.runtime.kept_run import KeptRun
@@ -38,13 +39,12 @@ from twin.scenario.verdict import Verdict
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
     from twin.bridge.clock import Clock
+    from twin.recording.live_screen import LiveScreen
     from twin.recording.sink import RerunSink
     from twin.sim.world import World
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
-_LIVE_S = 0.2
-"""A viewer is as much behind the run, at most."""
 _left: list[object] = []
 """What belongs to the process of which this one is a fork."""
 _SHOWN_S = 0.25
@@ -87,6 +87,7 @@ class OpenRun:
         taps: Sequence[Callable[[Sample[Any]], None]] = (),
         before_nodes: Callable[[World, Bus], None] | None = None,
         viewer: str | None = None,
+        screen: LiveScreen | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
         comparable: bool = True,
@@ -113,6 +114,7 @@ class OpenRun:
             taps: Called with every sample that a node publishes, from the first one on.
             before_nodes: Called when the world is there, and the bus without a node.
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
+            screen: Shows the run while it goes on, whether it is recorded or not. It changes no result.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
             comparable: Whether the hashes of each second are kept, for `twin diff`. They grow with the run:
@@ -129,7 +131,7 @@ class OpenRun:
         """What the run was, as far as it went."""
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out, viewer) if record else None
+        self._sink = _recording(scenario, out if record else None, viewer, screen)
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
         self._comparable = comparable
@@ -439,15 +441,19 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> RerunSink | None:
-    if viewer is None and (out is None or not scenario.recording.enabled):
+def _recording(
+    scenario: Scenario, out: Path | None, viewer: str | None, screen: LiveScreen | None
+) -> RerunSink | None:
+    kept = out is not None and scenario.recording.enabled
+    if viewer is None and screen is None and not kept:
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
     rate, name = scenario.recording.poses_hz, f"{scenario.name}-{scenario.seed}"
+    live = RecordingConfig(poses_hz=rate, loss_s=LATE_S)
     if viewer is not None:
         # Each is a recording of its own, which the viewer turns to.
-        live = RecordingConfig(poses_hz=rate, loss_s=_LIVE_S)
         return RerunSink(viewer, config=live, recording_id=f"{name}-{uuid.uuid4()}")
-    assert out is not None
-    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(poses_hz=rate), recording_id=name)
+    file = out / f"{scenario.name}.rrd" if out is not None and kept else None
+    config = live if screen is not None else RecordingConfig(poses_hz=rate)
+    return RerunSink(file, config=config, recording_id=name, screen=screen)
