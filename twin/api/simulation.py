@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -24,6 +25,7 @@ from twin.scenario.outside import Outside
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
     from twin.bridge.wire.session import SessionConfig
+    from twin.recording.live_screen import LiveScreen
     from twin.runtime import OpenRun, Progress
     from twin.scenario.outside import ClockMode
     from twin.scenario.schema import Scenario
@@ -54,6 +56,7 @@ class Simulation(Participant):
         save_model: str | Path | None = None,
         workers: int = 0,
         pace: float | None = None,
+        view: bool = False,
         listen: Sequence[str] = (),
         network: SessionConfig | None = None,
         nodes: Sequence[str] = (),
@@ -78,6 +81,9 @@ class Simulation(Participant):
             save_model: Folder for the compiled world as MJCF.
             workers: Processes that run the nodes of several robots beside this one. Changes no result.
             pace: Simulated seconds per second; None is as fast as possible. Changes no result.
+            view: Whether a viewer shows the run while it goes on, best with `pace=1.0`: a window where there
+                is a display, else a page, whose address is printed. Changes no result, and the run never
+                waits for it. The viewer ends with this object, or with Python: see `wait_for_viewer`.
             listen: Endpoints at which other processes may join the bus, such as tcp/127.0.0.1:7447.
             network: How else the bus takes part in a network, instead of `listen`.
             nodes: `FILE.py:FACTORY` of nodes to run, too.
@@ -89,6 +95,7 @@ class Simulation(Participant):
 
         Raises:
             SimulationError: A bag without a folder.
+            RecordingError: No viewer is installed.
         """
         if bag and out is None:
             raise SimulationError("bag=True needs a folder: say where with out=...")
@@ -114,6 +121,12 @@ class Simulation(Participant):
         self._verdict: Verdict | None = None
         self._held = ExitStack()
         weakref.finalize(self, self._held.close)
+        self._screen: LiveScreen | None = None
+        if view:
+            from twin.recording.live_screen import LiveScreen
+
+            self._screen = LiveScreen(_print)
+            weakref.finalize(self, self._screen.close)
         self.folder: Path | None = None
         """Where the results are; None before the start, or if nothing is written."""
 
@@ -214,6 +227,13 @@ class Simulation(Participant):
                 run.advance_to_end(progress)
         return self.finish()
 
+    def wait_for_viewer(self) -> None:
+        """Wait until the user closes the window of `view`, or presses Ctrl-C, as is printed."""
+        if self._screen is not None and self._screen.is_open:
+            _print(self._screen.how_to_end)
+            with suppress(KeyboardInterrupt):
+                self._screen.wait()
+
     @property
     def over(self) -> bool:
         """Whether the time is up, or the mission has been over for a moment."""
@@ -288,6 +308,7 @@ class Simulation(Participant):
             bag_hidden_topics=self._bag_hidden_topics,
             save_model=self._save_model,
             workers=self._workers,
+            screen=self._screen,
         )
         self._held.callback(self._run.close)
         if self._clock == "free" and not self._workers:
@@ -372,6 +393,10 @@ def run(
     """
     with Simulation(scenario, overrides=overrides, seed=seed, out=out) as simulation:
         return simulation.run()
+
+
+def _print(sentence: str) -> None:
+    sys.stderr.write(f"{sentence}\n")
 
 
 def _reason(error: BaseException) -> str:

@@ -3,5 +3,6 @@
 import os
 
 os.environ.setdefault("RERUN_ANALYTICS", "0")
-# What its file writer says of a full disk is said in our words, without colours in a pipe.
-os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
+# What its writers say of a full disk, or a viewer that does not read, is said in our words, without colours.
+_SILENT = ("re_log_encoding", "re_sdk", "re_quota_channel", "re_grpc_server")
+os.environ.setdefault("RUST_LOG", ",".join(("warn", *(f"{part}=off" for part in _SILENT))))

@@ -82,7 +82,10 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
             if view not in found:
                 raise RecordingError(f"no view {view!r} in {path}; valid: {', '.join(sorted(found))}")
             view_id = found[view]
-        picture = client.take_screenshot(view_id)
+        try:
+            picture = client.take_screenshot(view_id)
+        except ConnectionError as fault:
+            raise RecordingError(f"the view {view!r} is behind another tab, and not drawn") from fault
     write_whole(png, picture)
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays f
     from twin.bridge.topics import Publisher, Sample
     from twin.recording.channels.channel import Context
     from twin.recording.extents import RobotBox, Stage
+    from twin.recording.live_screen import LiveScreen
     from twin.recording.mounted import Mounted
     from twin.recording.poses import Poses
     from twin.sim.world import World
@@ -93,23 +94,27 @@ class RerunSink:
 
     def __init__(
         self,
-        target: Path | str,
+        target: Path | str | None,
         *,
         config: RecordingConfig | None = None,
+        screen: LiveScreen | None = None,
         application_id: str = "twin",
         recording_id: str = "run",
     ) -> None:
         """Prepare; the file is created by `declare`.
 
         Args:
-            target: Of the `.rrd` file, whose folder is created; or the address of a viewer.
+            target: Of the `.rrd` file, whose folder is created; or the address of a viewer, for which the run
+                waits; None if there is but the screen.
             config: What to keep.
+            screen: Shows the recording while it is made; the run never waits for it.
             application_id: Under which the viewer stores changes to the layout.
             recording_id: Fixed by the caller, so that two equal runs write equal recordings.
         """
         self._target = target
         self._config = config or RecordingConfig()
         self._ids = (application_id, recording_id)
+        self._screen = screen
         self._world: World | None = None
         self._early: list[Any] = []
         self._sources: list[Rows[Any]] = []
@@ -140,7 +145,7 @@ class RerunSink:
             cameras: By topic: what makes the pictures there.
 
         Raises:
-            RecordingError: The file cannot be written.
+            RecordingError: The file cannot be written, or the screen is not there.
         """
         from twin.recording.blueprint import layout
         from twin.recording.channels.channel import Context
@@ -157,7 +162,9 @@ class RerunSink:
         self._stage: Stage = Stage(world, shapes, self._robots)
         shown = [] if self._images_period is None else [picture_entity(topic) for topic in cameras]
         blueprint = layout(self._stage, self._robots, mirrors=self.mirrors, pictures=shown)
-        self._recording: rr.RecordingStream = open_recording(self._target, *self._ids, blueprint)
+        self._recording: rr.RecordingStream = open_recording(
+            self._target, *self._ids, blueprint, self._screen
+        )
         self._poses: Poses = Poses(
             world.body_names,
             self._stage,
@@ -262,6 +269,8 @@ class RerunSink:
                 self._recording.send_blueprint(blueprint)
         finally:
             end_recording(self._recording, self._target)
+            if self._screen is not None:
+                self._screen.finish()
 
     def _taker(self, topic: str, msgtype: str) -> _Take | None:
         """Return what to do with the messages of a topic, if anything."""

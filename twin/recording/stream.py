@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -17,6 +17,9 @@ from twin.errors import RecordingError
 from twin.files.writing import replaced
 from twin.recording.columns import Chunk, Component, send, sim_time
 from twin.recording.frames import WORLD, Frames
+from twin.recording.live_screen import LiveScreen
+
+Stream = TypeVar("Stream", bound=rr.RecordingStream)
 
 WALL_CLOCK_METRICS = frozenset(
     {"wall_time_s", "cpu_time_s", "real_time_factor", "pace_losses", "pace_lost_s"}
@@ -28,16 +31,53 @@ _abandoned: list[Any] = []
 """Streams whose writer has ended."""
 
 
+class _Shown(rr.RecordingStream):
+    """A stream whose content is shown on a screen, too: what is in it is made once."""
+
+    screen: LiveScreen
+    keeps: bool
+    """Whether the content goes anywhere else."""
+
+    def log(self, *args: Any, **options: Any) -> None:
+        if self.keeps:
+            super().log(*args, **options)
+        self.screen.put(lambda shown: shown.log(*args, **options), lasting=True)
+
+    def set_time(self, *args: Any, **options: Any) -> None:
+        if self.keeps:
+            super().set_time(*args, **options)
+        self.screen.put(lambda shown: shown.set_time(*args, **options), lasting=True)
+
+    def send_chunks(self, chunks: Any) -> None:
+        chunks = list(chunks)
+        if self.keeps:
+            super().send_chunks(chunks)
+        self.screen.put(lambda shown: shown.send_chunks(chunks))
+
+    def send_property(self, *args: Any, **options: Any) -> None:
+        if self.keeps:
+            super().send_property(*args, **options)
+
+    def send_blueprint(self, *args: Any, **options: Any) -> None:
+        """Keep it; who watches has turned the eyes of the screen, which stay as they are."""
+        if self.keeps:
+            super().send_blueprint(*args, **options)
+
+
 def open_recording(
-    target: Path | str, application_id: str, recording_id: str, blueprint: rrb.Blueprint
+    target: Path | str | None,
+    application_id: str,
+    recording_id: str,
+    blueprint: rrb.Blueprint,
+    screen: LiveScreen | None = None,
 ) -> rr.RecordingStream:
-    """Return a stream into a new file, or to a viewer at an address.
+    """Return a stream into a new file, or to a viewer at an address, and onto a screen.
 
     Nothing in it depends on the wall clock: no `log_time`, no start time; chunks end when the sink flushes.
     It has no footer, an index of all chunks: that would grow in memory for as long as a run goes on.
 
     Raises:
-        RecordingError: The file cannot be written.
+        RecordingError: The file cannot be written, or the screen is not there.
     """
     if isinstance(target, Path):
         try:
@@ -47,7 +87,23 @@ def open_recording(
             raise RecordingError(
                 f"{target}: cannot write the recording: {error.strerror}; choose another folder"
             ) from error
-    recording = rr.RecordingStream(
+    if screen is None:
+        recording = without_clock(rr.RecordingStream, application_id, recording_id)
+    else:
+        screen.open(application_id, recording_id, blueprint)
+        recording = shown = without_clock(_Shown, application_id, recording_id)
+        shown.screen, shown.keeps = screen, target is not None
+    with handed_over(blueprint):
+        if isinstance(target, Path):
+            recording.save(target, default_blueprint=blueprint, write_footer=False)
+        elif target is not None:
+            recording.connect_grpc(target, default_blueprint=blueprint)
+    return recording
+
+
+def without_clock(kind: type[Stream], application_id: str, recording_id: str) -> Stream:
+    """Return a stream without a start time, in which nothing has a time of its own."""
+    recording = kind(
         application_id,
         recording_id=recording_id,
         send_properties=False,
@@ -56,11 +112,6 @@ def open_recording(
     )
     recording.set_log_tick_enabled(False)
     recording.set_log_time_enabled(False)
-    with handed_over(blueprint):
-        if isinstance(target, Path):
-            recording.save(target, default_blueprint=blueprint, write_footer=False)
-        else:
-            recording.connect_grpc(target, default_blueprint=blueprint)
     return recording
 
 
@@ -95,7 +146,7 @@ def begin_flush(recording: rr.RecordingStream) -> None:
         recording.flush(timeout_sec=0.0)
 
 
-def flush(recording: rr.RecordingStream, target: Path | str) -> None:
+def flush(recording: rr.RecordingStream, target: Path | str | None) -> None:
     """Wait until everything so far is in the file, or has reached the viewer.
 
     A full disk ends Rerun's writer, for which its flush then may wait for ever.
@@ -126,7 +177,7 @@ def _has_room(folder: Path) -> bool:
     return True
 
 
-def end_recording(recording: rr.RecordingStream, target: Path | str) -> None:
+def end_recording(recording: rr.RecordingStream, target: Path | str | None) -> None:
     """See that all is in the file, and close it.
 
     A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
@@ -152,8 +203,8 @@ def whole_recording(path: Path) -> Iterator[Path]:
         raise _not_whole(path) from fault
 
 
-def _not_whole(target: Path | str) -> RecordingError:
-    if isinstance(target, str):
+def _not_whole(target: Path | str | None) -> RecordingError:
+    if not isinstance(target, Path):
         return RecordingError(f"the viewer at {target} takes nothing any more; was it closed?")
     path = target
     return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")

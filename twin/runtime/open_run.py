@@ -21,6 +21,7 @@ from twin.errors import RecordingError
 from twin.navigation.ahead import kernels_ahead
 from twin.plugins import execution
 from twin.recording.digest import RunDigest
+from twin.recording.live_screen import LATE_S
 from twin.recording.mounted import Mounted
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
@@ -39,13 +40,12 @@ from twin.scenario.verdict import Label, Verdict
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
     from twin.bridge.clock import Clock
+    from twin.recording.live_screen import LiveScreen
     from twin.recording.sink import RerunSink
     from twin.sim.world import World
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
-_LIVE_S = 0.2
-"""A viewer is as much behind the run, at most."""
 _left: list[object] = []
 """What belongs to the process of which this one is a fork."""
 _SHOWN_S = 0.25
@@ -88,6 +88,7 @@ class OpenRun:
         taps: Sequence[Callable[[Sample[Any]], None]] = (),
         before_nodes: Callable[[World, Bus], None] | None = None,
         viewer: str | None = None,
+        screen: LiveScreen | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
         endless: bool = False,
@@ -114,6 +115,7 @@ class OpenRun:
             taps: Called with every sample that a node publishes, from the first one on.
             before_nodes: Called when the world is there, and the bus without a node.
             viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
+            screen: Shows the run while it goes on, whether it is recorded or not. It changes no result.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
             endless: Whether it goes on when its mission is over, until somebody ends it. Then the hashes of
@@ -130,7 +132,7 @@ class OpenRun:
         """What the run was, as far as it went."""
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out, viewer) if record else None
+        self._sink = _recording(scenario, out if record else None, viewer, screen)
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
         self._endless = endless
@@ -451,19 +453,23 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(scenario: Scenario, out: Path | None, viewer: str | None) -> RerunSink | None:
-    if viewer is None and (out is None or not scenario.recording.enabled):
+def _recording(
+    scenario: Scenario, out: Path | None, viewer: str | None, screen: LiveScreen | None
+) -> RerunSink | None:
+    kept = out is not None and scenario.recording.enabled
+    if viewer is None and screen is None and not kept:
         return None
     from twin.recording.sink import RecordingConfig, RerunSink
 
     rates = {name: getattr(scenario.recording, name) for name in ("poses_hz", "images_hz")}
     name = f"{scenario.name}-{scenario.seed}"
+    live = RecordingConfig(**rates, loss_s=LATE_S)
     if viewer is not None:
         # Each is a recording of its own, which the viewer turns to.
-        live = RecordingConfig(**rates, loss_s=_LIVE_S)
         return RerunSink(viewer, config=live, recording_id=f"{name}-{uuid.uuid4()}")
-    assert out is not None
-    return RerunSink(out / f"{scenario.name}.rrd", config=RecordingConfig(**rates), recording_id=name)
+    file = out / f"{scenario.name}.rrd" if out is not None and kept else None
+    config = live if screen is not None else RecordingConfig(**rates)
+    return RerunSink(file, config=config, recording_id=name, screen=screen)
 
 
 def _cameras(parts: Parts) -> dict[str, Mounted]:

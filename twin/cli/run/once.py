@@ -42,6 +42,7 @@ def run_once(options: RunOptions) -> int:
         bag_hidden_topics=options.include_hidden_topics,
         save_model=options.save_model,
         pace=options.speed,
+        view=options.view,
         workers=options.workers,
         network=options.network,
         nodes=options.node or (),
@@ -86,6 +87,7 @@ def run_once(options: RunOptions) -> int:
             from twin.cli.experiments.difference_table import difference_report
 
             console.print(difference_report(difference))
+    simulation.wait_for_viewer()
     return max(verdict.exit_code, int(difference is not None and not difference.same))
 
 

@@ -48,9 +48,16 @@ class RunOptions:
     pace: Annotated[
         str | None,
         typer.Option(
-            help="Simulated seconds per second: a number, or max.", show_default="max; 1 with --free"
+            help="Simulated seconds per second: a number, or max.",
+            show_default="max; 1 with --free or --view",
         ),
     ] = None
+    view: Annotated[
+        bool,
+        typer.Option(
+            "--view", help="Show the run while it goes on: in a window, or on a page for a browser."
+        ),
+    ] = False
     listen: Annotated[
         list[str] | None,
         _others(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
@@ -107,6 +114,8 @@ class RunOptions:
             raise typer.BadParameter("--include-hidden-topics says what is in the bag; it needs --bag")
         if self.golden is not None and (self.repeat > 1 or self.expect_one_hash):
             raise typer.BadParameter("--golden compares one run; leave --repeat and --expect-one-hash out")
+        if self.view and (self.repeat > 1 or self.expect_one_hash):
+            raise typer.BadParameter("--view shows one run; leave --repeat and --expect-one-hash out")
         _ = self.overrides, self.speed  # raise ScenarioError
 
     @property
@@ -118,10 +127,10 @@ class RunOptions:
     def speed(self) -> float | None:
         """Simulated seconds per second; None: as fast as possible.
 
-        Who does not say it wants `max`, or real time if others live by their own clocks.
+        Who does not say it wants `max`, or real time if people watch or others live by their own clocks.
         """
         if self.pace is None or self.pace == "max":
-            return 1.0 if self.free and self.pace is None else None
+            return 1.0 if (self.free or self.view) and self.pace is None else None
         try:
             speed = float(self.pace)
         except ValueError:
