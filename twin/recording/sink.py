@@ -213,8 +213,9 @@ class RerunSink:
 
     def wants(self, publisher: Publisher[Any]) -> bool:
         """Return whether it shows a cloud, or a picture of a camera that is due (for `Bus.wishes`)."""
-        if publisher.msgtype == _CLOUD and not self._closed:
-            return True
+        if publisher.msgtype == _CLOUD:  # a camera shows its own as a picture
+            topics = (each for each in publisher.node.endpoints if isinstance(each, type(publisher)))
+            return not self._closed and all(each.msgtype != _PICTURE for each in topics)
         if publisher.msgtype != _PICTURE or self._images_period is None or self._closed:
             return False
         now_ns = publisher.node.now_ns

@@ -21,7 +21,6 @@ from twin.errors import RecordingError
 from twin.navigation.ahead import kernels_ahead
 from twin.plugins import execution
 from twin.recording.digest import RunDigest
-from twin.recording.live_screen import LATE_S
 from twin.recording.mounted import Mounted
 from twin.runtime.build import Parts, build
 from twin.runtime.defaults import from_description as derive
@@ -459,6 +458,7 @@ def _recording(
     kept = out is not None and scenario.recording.enabled
     if viewer is None and screen is None and not kept:
         return None
+    from twin.recording.live_screen import LATE_S
     from twin.recording.sink import RecordingConfig, RerunSink
 
     rates = {name: getattr(scenario.recording, name) for name in ("poses_hz", "images_hz")}

@@ -17,7 +17,7 @@ from twin.live.futures import Futures, WhatIf
 from twin.live.futures.futures import Answer
 from twin.live.mirror.followed_clock import FollowedClock
 from twin.live.mirror.mirror import Mirror
-from twin.live.mirror.source import Source
+from twin.live.mirror.source import ClockReading, Source
 from twin.live.plant import Plant
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import Scenario
@@ -35,7 +35,6 @@ _NOT_CARRIED = ("/rosout", "/parameter_events", "/robot_description", "/tf_stati
 class PlantSource(Source):
     """A plant that ticks after the mirror, and what the two tell each other."""
 
-    clock_bound_s = 0.0
     is_live = True
 
     def __init__(self, plant: Plant, network: SessionConfig | None) -> None:
@@ -72,7 +71,10 @@ class PlantSource(Source):
             self.plant.advance(lambda: True)
         self._heard = deque((0, sample) for _, sample in self._heard if sample.topic == "/tf_static")
 
-    def after_tick(self) -> None:
+    def reading(self, robot: str) -> ClockReading:
+        return ClockReading(offset_s=0.0, bound_s=0.0)
+
+    def after_tick(self) -> tuple[()]:
         self._ticks += 1
         while self._told and self._told[0][0] <= self._ticks:
             self._cmd_vel.publish(self._told.popleft()[1])
@@ -85,6 +87,7 @@ class PlantSource(Source):
                 kind = codec(sample.msgtype).cls
                 self._publishers[sample.topic] = self._node.create_publisher(kind, sample.topic, qos)
             self._publishers[sample.topic].publish(sample.message, frozen=True)
+        return ()
 
     def close(self) -> None:
         self.plant.close()

@@ -42,7 +42,6 @@ _ONLY_NAV2S = (
     "fine_xy_goal_tolerance",
     "max_angular_decel",
     "max_angular_vel",
-    "max_linear_accel",
     "simulation_step",
     "transform_tolerance",
     "yaw_goal_tolerance",
