@@ -257,7 +257,7 @@ def test_a_damaged_file_is_read_or_refused(at: int, byte: int, encoding: Any) ->
 def test_what_a_format_lacks_is_told(tmp_path: Path) -> None:
     points = mixed()
     with pytest.raises(
-        CloudError, match=r"the ending '.xyz' is no format of clouds; valid are .pcd and .ply"
+        CloudError, match=r"the ending '.xyz' is no format of clouds; valid are .pcd, .ply, .las"
     ):
         write_cloud(tmp_path / "cloud.xyz", points)
     with pytest.raises(CloudError, match=r"PLY has no type for the field 'd' of uint64"):
@@ -267,3 +267,50 @@ def test_what_a_format_lacks_is_told(tmp_path: Path) -> None:
     write_cloud(tmp_path / "one.pcd", make_points([(1, 2, 3)]))
     with pytest.raises(CloudError, match=r"no such file; did you mean .*one.pcd"):
         read_cloud(tmp_path / "ome.pcd")
+
+
+def test_a_las_file_is_read_by_others_and_read_back(tmp_path: Path) -> None:
+    """laspy alone says what is in the file; a point that was not measured is not."""
+    laspy = pytest.importorskip("laspy")
+    points = np.zeros(4, [(name, "<f4") for name in ("x", "y", "z", "rgb", "intensity")] + [("ring", "<u2")])
+    points["x"], points["y"], points["z"] = (1.25, np.nan, -3.5, 7), 2, (0, 1, 2, 3.0625)
+    points["intensity"], points["ring"] = (1.4, 2, -5, 1e9), (0, 1, 2, 15)
+    points["rgb"] = np.full(4, 0x102030, np.uint32).view(np.float32)
+    write_cloud(tmp_path / "hall.las", points)
+    theirs = laspy.read(tmp_path / "hall.las")
+    assert theirs.x == pytest.approx([1.25, -3.5, 7])
+    assert list(theirs.intensity) == [1, 0, 65535]
+    assert list(theirs.blue) == [0x3030] * 3
+    again = read_cloud(tmp_path / "hall.las")
+    assert again["z"] == pytest.approx([0, 2, 3.0625])
+    assert list(again["ring"]) == [0, 2, 15]
+    assert [list(row[:3]) for row in channels(again["rgb"])] == [[0x10, 0x20, 0x30]] * 3
+
+
+def test_surveyors_coordinates_keep_their_millimetres_in_las(tmp_path: Path) -> None:
+    pytest.importorskip("laspy")
+    points = np.zeros(2, [(name, "<f8") for name in "xyz"])
+    points["x"] = 500_000.1234, 500_001.4321
+    write_cloud(tmp_path / "site.las", points)
+    assert read_cloud(tmp_path / "site.las")["x"] == pytest.approx(points["x"], abs=1e-4, rel=0)
+    points["x"] = 0, 1e6
+    with pytest.raises(CloudError, match="LAS holds points within 214748 m of each other; x spans more"):
+        write_cloud(tmp_path / "site.las", points)
+
+
+def test_a_las_file_that_lies_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    pytest.importorskip("laspy")
+    path = tmp_path / "bad.las"
+    write_cloud(path, make_points([(1, 2, 3), (4, 5, 6)]))
+    whole = path.read_bytes()
+    for content, said in (
+        (b"", r"'LASF'"),
+        (whole[:100], r"ends after 100 bytes"),
+        (whole[:-1], r"the header promises \d+ bytes, but \d+ are there"),
+        (whole[:100] + b"\xff" * 4 + whole[104:], r"promises \d+ bytes or more, but"),
+        (whole[:247] + (10**12).to_bytes(8, "little") + whole[255:], r"promises \d+ bytes, but"),
+        (whole[:104] + b"\x3f" + whole[105:], r"cannot be read as LAS"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(CloudError, match=said):
+            read_cloud(path)

@@ -46,8 +46,8 @@ def test_a_cloud_is_cropped_thinned_and_converted(invoke: Invoke) -> None:
     ("command", "said"),
     [
         (("info", "rows.pcd"), "rows.pcd: no such file; did you mean row.pcd?"),
-        (("info", "."), "the ending '' is no format of clouds; valid are .pcd and .ply"),
-        (("convert", "row.pcd", "row.las"), "row.las: the ending '.las' is no format"),
+        (("info", "."), "the ending '' is no format of clouds; valid are .pcd, .ply, .las"),
+        (("convert", "row.pcd", "row.xyz"), "row.xyz: the ending '.xyz' is no format"),
         (("convert", "row.pcd", "row.ply", "--encoding", "binary_compressed"), "PLY has no encoding"),
         (("crop", "row.pcd", "out.pcd", "--max", "1,2"), "--max is '1,2'; valid are three numbers"),
         (("crop", "row.pcd", "out.pcd", "--max", "1,nan,2"), "--max is '1,nan,2'; valid are three numbers"),

@@ -56,7 +56,8 @@ def test_a_cable_is_cut_in_the_middle_of_a_command(robot: live.LiveBus, endpoint
         before, cut = len(told), len(sent)
         cable.whole.set()
         assert both(lambda: told[-1] > 0.0)
-        assert both(lambda: client.is_present and client.latest and client.latest.sent_ns > sent[cut])
+        assert both(lambda: len(sent) > cut and client.is_present and client.latest is not None)
+        assert both(lambda: client.latest is not None and client.latest.sent_ns > sent[cut])
         verdicts = {}
         for message in said:
             (status,) = message.status

@@ -18,10 +18,10 @@ Encoding = Annotated[
     Literal["ascii", "binary", "binary_compressed"],
     typer.Option("--encoding", help="How numbers are written; binary_compressed: PCD only."),
 ]
-File = Annotated[Path, typer.Argument(metavar="FILE", help="A .pcd or .ply file.", show_default=False)]
-Source = Annotated[Path, typer.Argument(metavar="IN", help="A .pcd or .ply file.", show_default=False)]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="A .pcd, .ply or .las file.", show_default=False)]
+Source = Annotated[Path, typer.Argument(metavar="IN", help="A .pcd, .ply or .las file.", show_default=False)]
 Output = Annotated[
-    Path, typer.Argument(metavar="OUT", help="The .pcd or .ply file to write.", show_default=False)
+    Path, typer.Argument(metavar="OUT", help="The .pcd, .ply or .las file to write.", show_default=False)
 ]
 
 

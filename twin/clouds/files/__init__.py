@@ -1,4 +1,4 @@
-"""Files of points: PCD as PCL writes it, PLY as CloudCompare, Open3D and MeshLab do."""
+"""Files of points: PCD as PCL writes it, PLY as CloudCompare, Open3D and MeshLab do, LAS of surveyors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import get_args
 
 from twin.clouds.files.encodings import Encoding
+from twin.clouds.files.las import las_of, parse_las
 from twin.clouds.files.pcd import parse_pcd, pcd_of
 from twin.clouds.files.ply import parse_ply, ply_of
 from twin.clouds.points import Points
@@ -17,12 +18,13 @@ from twin.files.writing import write_whole
 _FORMATS: dict[str, tuple[Callable[[bytes, Path], Points], Callable[[Points, Encoding], bytes]]] = {
     ".pcd": (parse_pcd, pcd_of),
     ".ply": (parse_ply, ply_of),
+    ".las": (parse_las, las_of),
 }
 ENCODINGS: tuple[str, ...] = get_args(Encoding)
 
 
 def read_cloud(path: Path) -> Points:
-    """Return the cloud of a .pcd or .ply file, organised if the file says so.
+    """Return the cloud of a .pcd, .ply or .las file, organised if the file says so.
 
     Raises:
         CloudError: There is no such file, or it is not what its ending says: its first fault, with the line
@@ -40,7 +42,7 @@ def read_cloud(path: Path) -> Points:
 
 
 def write_cloud(path: Path, points: Points, encoding: Encoding = "binary") -> None:
-    """Write a cloud as its ending says: .pcd or .ply.
+    """Write a cloud as its ending says: .pcd, .ply or .las.
 
     Raises:
         CloudError: The format has no such encoding, or nothing for a field of the cloud.
@@ -54,7 +56,7 @@ def check_ending(path: Path) -> None:
     """Refuse, before any work, a file whose format is unknown.
 
     Raises:
-        CloudError: Its ending is neither .pcd nor .ply.
+        CloudError: Its ending is none of them.
     """
     _format(path)
 
@@ -63,6 +65,8 @@ def _format(path: Path) -> tuple[Callable[[bytes, Path], Points], Callable[[Poin
     found = _FORMATS.get(path.suffix.lower())
     if found is None:
         raise CloudError(
-            Problem(f"the ending {path.suffix!r} is no format of clouds; valid are .pcd and .ply", path)
+            Problem(
+                f"the ending {path.suffix!r} is no format of clouds; valid are {', '.join(_FORMATS)}", path
+            )
         )
     return found
