@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,10 +84,15 @@ class Decal:
     body: str = ""
     """On which: a link `<robot>/<link>`, goods, or nothing for the world."""
     paint: Callable[[], NDArray[np.uint8]] = field(compare=False)
-    """Returns the picture, shape (height, width, 3), the upper row first; called only if it is drawn."""
+    """Returns the picture, shape (height, width, 3), the upper row first; called once, when it is drawn."""
 
     def __post_init__(self) -> None:
         _keep(self.T_body_decal)
+
+    @cached_property
+    def picture(self) -> NDArray[np.uint8]:
+        """What is on it, shape (height, width, 3)."""
+        return self.paint()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The world as it is drawn: textures, materials, decals and lights, and scenery in as few meshes as possible."""
+"""The world as it is drawn: textures, decals, lights, and scenery in as few meshes as possible."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _scenery(spec: mujoco.MjSpec, scene: Scene) -> None:
 def _decals(spec: mujoco.MjSpec, scene: Scene) -> None:
     for decal in scene.decals:
         name = f"decal {decal.name}"
-        _add_texture(spec, name, decal.paint())
+        _add_texture(spec, name, decal.picture)
         material = spec.add_material(name=name, specular=0.1, shininess=0.3)
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
         body = spec.body(decal.body) if decal.body else spec.worldbody

@@ -34,7 +34,7 @@ def _plaster() -> Array:
     rows, columns = np.mgrid[0:TEXELS, 0:TEXELS] / TEXELS
     course = np.floor(2.0 * rows)
     joint = (np.abs((2.0 * rows) % 1.0 - 0.5) > 0.48) | (np.abs((columns + 0.5 * course) % 1.0 - 0.5) > 0.49)
-    return _grey(0.97 - 0.10 * joint + 0.015 * smooth_noise("plaster", 48, 48, TEXELS, TEXELS))
+    return _grey(0.98 - 0.07 * joint + 0.015 * smooth_noise("plaster", 48, 48, TEXELS, TEXELS))
 
 
 def _wood() -> Array:
