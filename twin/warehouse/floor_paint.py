@@ -21,6 +21,8 @@ FINEST, MOST_PIXELS = 50.0, 1400
 """Pixels for each metre, and along the longer edge of the hall at most."""
 _CONCRETE = (0.63, 0.635, 0.64)
 _YELLOW: Rgba = (0.90, 0.72, 0.15, 1.0)
+_INK = 0.93
+"""How much of the light black letters swallow."""
 _LANE, _LANE_GAP = 0.08, 0.22
 """Width of a line around a rack, and how far from it [m]."""
 _SLAB, _JOINT = 4.0, 0.02
@@ -144,16 +146,15 @@ def _zone(ground: _Floor, zone: Zone) -> None:
 
 def sign(words: str, ground: Rgba = (0.95, 0.80, 0.15, 1.0)) -> NDArray[np.uint8]:
     """Return a sign with black letters and a black rim, twice as wide as high."""
-    picture = np.tile(np.array(ground[:3]), (128, 256, 1))
-    letters = text(words, 72)
-    scale = min(84 / letters.shape[0], 220 / letters.shape[1])
+    height, rim = 96, 4
+    picture = np.full((height, 2 * height), _INK)
+    picture[rim:-rim, rim:-rim] = 0.0
+    letters = text(words)
+    scale = min(0.6 * height / letters.shape[0], 1.7 * height / letters.shape[1])
     letters = zoom(letters, scale, order=1)
-    top, left = (128 - letters.shape[0]) // 2, (256 - letters.shape[1]) // 2
-    part = picture[top : top + letters.shape[0], left : left + letters.shape[1]]
-    part *= 1.0 - 0.93 * letters[..., None]
-    for rim in (picture[:6], picture[-6:], picture[:, :6], picture[:, -6:]):
-        rim[:] = 0.08
-    return as_bytes(picture)
+    top, left = (np.array(picture.shape) - letters.shape) // 2
+    picture[top : top + letters.shape[0], left : left + letters.shape[1]] = _INK * letters
+    return as_bytes((1.0 - picture[..., None]) * np.array(ground[:3]))
 
 
 def text(words: str, pixels: int = 60) -> Array:
