@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -186,6 +187,26 @@ class World:
         moved = Pose3.from_pose2(motion) @ Pose3(pose[:3].copy(), pose[3:].copy())
         pose[:3], pose[3:] = moved.xyz, moved.quat_wxyz
         speed[:] = Pose2(0.0, 0.0, motion.yaw).apply(speed)
+
+    @contextmanager
+    def elsewhere(self, body: str, T_world_body: Pose3) -> Iterator[None]:
+        """Let goods or the root link of a robot be somewhere else while somebody looks, between two steps.
+
+        Raises:
+            ValueError: It has no free joint.
+        """
+        free = self._free_joint(self.model.body(body).id)
+        if free is None:
+            raise ValueError(f"'{body}' has no free joint")
+        pose = self.data.qpos[free[0] : free[0] + 7]
+        before = pose.copy()
+        pose[:3], pose[3:] = T_world_body.xyz, T_world_body.quat_wxyz
+        self.refresh_poses()
+        try:
+            yield
+        finally:
+            pose[:] = before
+            self.refresh_poses()
 
     def contacts(self) -> list[Contact]:
         """Return what robots touch except for the floor and themselves, as of the last physics step."""

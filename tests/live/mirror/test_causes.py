@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.live.beside import Beside, plant
-from twin.bridge.msgs import Twist, new
+from twin.bridge.msgs import PoseWithCovarianceStamped, Twist, new
 from twin.live.mirror.mirror import Mirror
 from twin.live.plant import Plant
 from twin.scenario.schema import Scenario, load
@@ -45,9 +45,9 @@ class Happening:
 
 
 class Story:
-    """A mirror that drives a robot in eights, and what was told of it."""
+    """A mirror that drives a robot in eights, or leaves it where it stands, and what was told of it."""
 
-    def __init__(self, faults: str = "[]", perturb: str = "", **options: Any) -> None:
+    def __init__(self, faults: str = "[]", perturb: str = "", *, drives: bool = True, **options: Any) -> None:
         self.robot = plant(scenario(faults), perturb)
         self.cable = Beside(self.robot, **options)
         self.happened: list[Happening] = [Happening("begins", 0.0)]
@@ -56,7 +56,9 @@ class Story:
         self._world = self.mirror.run.run.world
         node = self.mirror.run.run.bus.create_node("operator")
         self._commands = node.create_publisher(Twist, "/cmd_vel")
-        node.create_timer(50_000_000, self._drive)
+        self._poses = node.create_publisher(PoseWithCovarianceStamped, "/initialpose")
+        if drives:
+            node.create_timer(50_000_000, self._drive)
 
     def go_on(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
         """Go on for so long, at most."""
@@ -86,6 +88,14 @@ class Story:
         self.robot = plant(scenario(), perturb)
         self.cable.start(self.robot)
         return self.robot
+
+    def tell_where_it_is(self, x: float, y: float) -> None:
+        """Tell localisation, which believes it, where the robot is [m]."""
+        told = new(PoseWithCovarianceStamped)
+        told.header.frame_id = "map"
+        told.pose.pose.position.x, told.pose.pose.position.y = x, y
+        told.pose.covariance[[0, 7, 35]] = 0.01
+        self._poses.publish(told)
 
     def _note(self) -> bool:
         now, events = self.happened[-1], self.mirrored.events
@@ -123,6 +133,40 @@ def test_a_robot_that_starts_again_is_told_of_and_put_where_it_is_once(clock: st
     _, kidnapped, again = story.happened
     assert (kidnapped.alarms, kidnapped.resets) == ({"kidnapped"}, 1)
     assert (again.alarms, again.resets, again.label) == ({"silent robot", "robot restarted"}, 1, "twin")
+
+
+def test_a_robot_that_starts_again_far_from_where_localisation_has_odometry_begin_is_put_there_once() -> None:
+    """It was carried away before, so odometry's frame is elsewhere; and silent for so long that it may be."""
+    story = Story("[{kidnapping: {at: 3 s, to: {x: -6, y: 2, yaw: 150 deg}}}]")
+    with story.mirror:
+        story.go_on(13.0)
+        story.happens("starts again")
+        story.start_again(f"clock_offset={story.now_s + 6.0}s", 6.0)
+        story.go_on(14.0)
+        assert story.apart < 0.05
+        story.happens("drives on")
+        story.go_on(6.0)
+    _, again, later = story.happened
+    assert (again.alarms, again.resets, again.label) == ({"silent robot", "robot restarted"}, 1, "twin")
+    assert (later.alarms, later.resets, later.label) == (set(), 0, "twin")
+
+
+@pytest.mark.parametrize("x", [-30.0, 4.0])
+def test_localisation_that_scans_contradict_forbids_a_twin_and_finds_a_robot_that_stands(x: float) -> None:
+    """A filter takes in no scan while a robot stands: it would stay where it was told to be, off the map."""
+    story = Story(drives=False)
+    with story.mirror:
+        story.go_on(2.0)
+        for _ in range(30):  # somebody insists
+            story.tell_where_it_is(x, -1.0)
+            story.go_on(0.2)
+        (why,) = story.mirrored.divergence.doubts
+        assert why.startswith(f"localisation lost: it finds the robot at ({x:.0f}.")
+        assert why.endswith("which is not on the map") == (x == -30.0)
+        assert why in story.mirror.statuses()[0].judgement.why
+        story.go_on(12.0)
+        assert not story.mirrored.divergence.doubts
+        assert story.apart < 0.1
 
 
 def test_a_robot_whose_clock_was_set_back_is_missed_when_it_falls_silent() -> None:

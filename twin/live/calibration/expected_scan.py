@@ -12,22 +12,19 @@ from twin.sim.world import World
 
 
 class ExpectedScan:
-    """Puts the robot somewhere and casts its lidar's rays, without noise; the world must not run then."""
+    """Casts the rays of the robot's lidar as if it were somewhere else, without noise."""
 
     def __init__(self, world: World, robot: RobotHandle, lidar: Lidar) -> None:
         self._world, self._robot, self._lidar = world, robot, lidar
-        link, base = f"{robot.name}/{lidar.spec.link}", world.pose(robot.base)
-        self._height = float(base.xyz[2])
-        T_base_lidar = base.inverse() @ world.pose(link)
+        T_base_lidar = world.pose(robot.base).inverse() @ world.pose(f"{robot.name}/{lidar.spec.link}")
         self.mount = T_base_lidar.to_pose2()
         """Of the lidar in the frame of the robot's root."""
 
     def __call__(self, lidar: Pose2) -> View:
         """Return what it sees from a pose of the lidar in the world."""
-        base = lidar @ self.mount.inverse()
-        self._robot.carry(Pose3.from_pose2(base, self._height))
-        self._world.refresh_poses()
-        ranges, directions, normals = self._lidar.look()
+        height = float(self._world.pose(self._robot.base).xyz[2])
+        with self._world.elsewhere(self._robot.base, Pose3.from_pose2(lidar @ self.mount.inverse(), height)):
+            ranges, directions, normals = self._lidar.look()
         toward = np.einsum("ij,ij->i", directions, normals)
         c, s = np.cos(lidar.yaw), np.sin(lidar.yaw)
         ahead, left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])

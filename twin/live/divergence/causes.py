@@ -23,6 +23,7 @@ THRESHOLDS = {
     "blind lidar": Threshold(on=0.4, off=0.2, for_s=1.0),  # share of rays
     "obstacle not in the model": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
     "obstacle of the model is gone": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
+    "localisation lost": Threshold(on=4.0, off=0.1, for_s=0.0),  # [s]
     "kidnapped": Threshold(on=0.4, off=0.15, for_s=0.3),  # share of rays
     "wheel slip": Threshold(on=0.06, off=0.03, for_s=0.4, until_s=5.0),  # [m] or [rad]
     "wheel radius": Threshold(on=0.01, off=0.006, for_s=2.0, until_s=5.0),  # share
@@ -63,6 +64,8 @@ def _rules(evidence: Evidence) -> tuple[Callable[[Evidence], Iterator[Finding]],
     """Return which rules can be believed."""
     if evidence.odometry_jump is not None or evidence.invalid:
         return (_blind,)
+    if evidence.lost is not None:
+        return (_blind, _kidnapped)
     return (_blind, _things, _kidnapped, _slip, _wheels, _response)
 
 
@@ -107,7 +110,19 @@ def _odometry_jump(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(cause="odometry jump", number=max(jump.distance, abs(jump.turn)), text=text)
 
 
-_ANY_TIME: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (_link, _invalid, _odometry_jump)
+def _lost(evidence: Evidence) -> Iterator[Finding]:
+    if evidence.lost is None:
+        return
+    fit = evidence.lost.fit
+    place = f"({fit.pose.x:.2f}, {fit.pose.y:.2f})"
+    wrong = 1.0 - fit.match.explained
+    text = f"it finds the robot at {place}, where {wrong:.0%} of the rays should end elsewhere"
+    if not fit.on_map:
+        text = f"it finds the robot at {place}, which is not on the map"
+    yield Finding(cause="localisation lost", number=evidence.lost.for_s, text=text)
+
+
+_ANY_TIME: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (_link, _invalid, _odometry_jump, _lost)
 
 
 def _blind(evidence: Evidence) -> Iterator[Finding]:

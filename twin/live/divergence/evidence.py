@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from twin.geometry import Pose2
 from twin.live.divergence.flow import FlowReport
 from twin.live.divergence.motion import Ratio, Stretch
+from twin.live.divergence.scans import ScanMatch
 from twin.live.divergence.things import Place
 
 
@@ -47,6 +49,27 @@ class Jump:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A scan against what the model expects from where localisation says that the robot is."""
+
+    match: ScanMatch
+    pose: Pose2
+    """Of the base in the map, as localisation says."""
+    on_map: bool
+    """Whether the map knows what is there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lost:
+    """Localisation is wrong."""
+
+    for_s: float
+    """[s]"""
+    fit: Fit
+    """The latest."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Evidence:
     """Of one robot, now; None: nothing tells."""
 
@@ -62,6 +85,7 @@ class Evidence:
     """Share of the odometry of the last seconds that contradicts what came just before."""
     odometry_jump: Jump | None = None
     localisation_jump: Jump | None = None
+    lost: Lost | None = None
     pose_was_set: bool = False
     """Somebody told localisation lately where the robot is."""
     scan: ScanEvidence | None = None

@@ -18,7 +18,7 @@ from twin.geometry import Array, Pose2, wrap_angle
 from twin.live.divergence.alarms import Alarm, Alarms
 from twin.live.divergence.causes import THRESHOLDS, causes
 from twin.live.divergence.events import Edge, EventPairs, Misalignment
-from twin.live.divergence.evidence import Evidence, Jump, ScanEvidence
+from twin.live.divergence.evidence import Evidence, Fit, Jump, Lost, ScanEvidence
 from twin.live.divergence.flow import Flow
 from twin.live.divergence.histories import PoseHistory
 from twin.live.divergence.innovation import Believed, NisWindow, nis
@@ -55,6 +55,8 @@ _UNSURE, _CONTRARY, _UNSURE_RESIDUAL = 0.6, 0.05, 0.06
 """A robot is not where it is thought to be if less of a scan is explained, and rays of it end both before and
 behind what is expected; or if what is explained differs by so much [m]. What stands before a lidar hides much
 of it, but makes no ray longer."""
+_LOST = 0.3
+"""Nor is it if less of a scan than that is explained from there, whatever stands before the lidar."""
 _BREAK = 0.3
 """So much less of a scan is explained than of the one before it: one of the two robots was moved."""
 _START = 0.02
@@ -118,6 +120,7 @@ class DivergenceMonitor:
         self._invalid: deque[int] = deque(maxlen=1000)
         self._jumps: deque[tuple[int, Pose2, bool]] = deque(maxlen=100)
         self._odom_count: deque[int] = deque(maxlen=1000)
+        self._restarted: tuple[int, Pose2, bool] | None = None
         self._told_pose_ns: int | None = None
         self._jumped_ns: int | None = None
         self._stepped_ns: int | None = None
@@ -145,6 +148,8 @@ class DivergenceMonitor:
         self._places, self._repeated = Places(), RepeatedScan(5, 0.1)
         self._frozen = False
         self._broke_ns: int | None = None
+        self._fit: Fit | None = None
+        self._lost_ns: int | None = None
         self._unsure_ns: int | None = None
         self._correction: Pose2 | None = None
 
@@ -219,6 +224,8 @@ class DivergenceMonitor:
 
     def _jumped(self, stamp_ns: int, now_ns: int, step: Pose2, *, to_start: bool) -> None:
         self._jumps.append((now_ns, step, to_start))
+        if to_start:
+            self._restarted = self._jumps[-1]
         self._jumped_ns = stamp_ns
         self._odom.clear()
         self._begin_motion()
@@ -258,6 +265,35 @@ class DivergenceMonitor:
         """Take what the physical lidar measured."""
         if self._flows["scans"].take(scan.stamp_ns, now_ns):
             self._scans.append((scan, T_base_lidar))
+
+    def fits(self, fit: Fit) -> None:
+        """Take how a scan of the physical lidar fits where localisation says that it was taken."""
+        match = fit.match
+        if match.returned < _LEAST_RETURNED and fit.on_map:
+            return  # it tells nothing
+        self._fit = fit
+        contrary = min(match.shorter, match.longer) > _CONTRARY
+        if fit.on_map and match.explained >= _LOST and (match.explained >= _UNSURE or not contrary):
+            self._lost_ns = None
+            return
+        self._unsure_ns = match.stamp_ns
+        if self._lost_ns is None:
+            self._lost_ns = match.stamp_ns
+
+    @property
+    def doubts_localisation(self) -> bool:
+        """Whether the latest scan, if one has told anything lately, shows too little of what it should."""
+        fit, latest = self._fit, self._odom.latest
+        if fit is None or (latest is not None and latest.stamp_ns - fit.match.stamp_ns > 2 * _SECOND_NS):
+            return False
+        return not fit.on_map or fit.match.explained < _UNSURE
+
+    @property
+    def lost(self) -> Lost | None:
+        """For how long localisation has been wrong; None: it is not, as far as can be told."""
+        if self._fit is None or self._lost_ns is None:
+            return None
+        return Lost(for_s=(self._fit.match.stamp_ns - self._lost_ns) * 1e-9, fit=self._fit)
 
     def virtual_scan(self, scan: Scan) -> None:
         """Take what the virtual one did."""
@@ -504,8 +540,11 @@ class DivergenceMonitor:
         since = now_ns - _RECENT_NS
         flows = {name: flow.report(now_ns) for name, flow in self._flows.items()}
         recent = [jump for jump in self._jumps if now_ns - jump[0] < 3 * _SECOND_NS]
-        if not recent and self._jumps and self._jumps[-1][2] and self._is_unsure(now_ns):
-            recent = [self._jumps[-1]]  # it has begun again, and has not been found yet
+        if not recent and self._restarted is not None:
+            if self._is_unsure(now_ns):
+                recent = [self._restarted]  # it has not been found yet
+            else:
+                self._restarted = None
         count = sum(1 for stamp in self._odom_count if now_ns - stamp < 3 * _SECOND_NS)
         jumped = None
         if recent:
@@ -531,6 +570,7 @@ class DivergenceMonitor:
             alternating=len(recent) / count if len(recent) > 2 else 0.0,
             odometry_jump=jumped,
             localisation_jump=found,
+            lost=self.lost,
             pose_was_set=self._told_pose_ns is not None and self._told_pose_ns >= since,
             scan=self._scan_evidence(now_ns),
             more=self._places.found("more"),

@@ -27,12 +27,20 @@ from twin.live.divergence.alarms import Alarm
 from twin.live.divergence.events import Edge
 from twin.live.divergence.monitor import DivergenceMonitor
 from twin.live.divergence.scans import Scan
+from twin.live.mirror.claim import Claim
 from twin.live.mirror.follower import Difference
 from twin.models.description import RobotDescription
 from twin.runtime.defaults.from_description import scan_lidar
 from twin.runtime.stacks.robot import RobotStack
 
-_DOUBTS = ("duplicate robot", "invalid data", "robot restarted", "odometry jump", "kidnapped")
+_DOUBTS = (
+    "duplicate robot",
+    "invalid data",
+    "robot restarted",
+    "odometry jump",
+    "kidnapped",
+    "localisation lost",
+)
 """Alarms that forbid to speak of a twin."""
 _TALKS_NS = 1_000_000_000
 _TALKS = 5
@@ -47,16 +55,19 @@ _LASTS_NS = 200_000_000
 class DivergenceNode:
     """Hears the hardware's topics of both robots, and localisation."""
 
-    def __init__(self, node: Node, stack: RobotStack, tell: Callable[[str, str], None]) -> None:
+    def __init__(
+        self, node: Node, stack: RobotStack, claim: Claim | None, tell: Callable[[str, str], None]
+    ) -> None:
         """Hear both robots of a stack.
 
         Args:
             node: In the virtual robot's namespace.
             stack: Of both.
+            claim: Of the localisation of the physical one; None: there is nothing to compare it with.
             tell: Takes name and text of what begins and ends.
         """
         self.node, self.monitor = node, DivergenceMonitor(self._publish)
-        self._tell, self._stack = tell, stack
+        self._tell, self._stack, self._claim = tell, stack, claim
         self._series = {
             name: node.create_publisher(Float64, f"divergence/{name}", 10) for name in DivergenceMonitor.NAMES
         }
@@ -76,6 +87,9 @@ class DivergenceNode:
     def place(self, now_ns: int, virtual: Pose2, driven: Pose2) -> None:
         """Take where the virtual robot is, and where it would be without corrections; once a tick."""
         self.monitor.virtual_pose(now_ns, virtual, driven)
+        fit = None if self._claim is None else self._claim.look()
+        if fit is not None:
+            self.monitor.fits(fit)
         if not self.monitor.step(now_ns):
             return
         self.monitor.publishers = self._count(now_ns)
@@ -85,6 +99,12 @@ class DivergenceNode:
         for cause in self._alarms.keys() - active.keys():
             self._tell("alarm", f"{cause}: over")
         self._alarms = active
+
+    def clock_set(self, by_ns: int) -> None:
+        """Begin anew: the robot's clock was set by so much [ns]."""
+        self.monitor.clock_set(by_ns)
+        if self._claim is not None:
+            self._claim.forget()
 
     def difference(self, difference: Difference) -> None:
         """Take how far the robots were apart."""
@@ -167,8 +187,12 @@ class DivergenceNode:
     def _on_scan(self, message: LaserScan) -> None:
         base = self._stack.frames.base
         T_base_lidar = self._stack.robot_pose.relative(base, message.header.frame_id)
-        if T_base_lidar is not None:
-            self.monitor.scan(_scan(message), T_base_lidar, self.node.now_ns)
+        if T_base_lidar is None:
+            return
+        scan = _scan(message)
+        self.monitor.scan(scan, T_base_lidar, self.node.now_ns)
+        if self._claim is not None:
+            self._claim.see(scan, T_base_lidar)
 
     def _on_virtual_scan(self, message: LaserScan) -> None:
         self.monitor.virtual_scan(_scan(message))

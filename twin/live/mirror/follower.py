@@ -101,13 +101,14 @@ class Follower:
         driven = self._at(stamp_ns, lambda noted: noted.driven)
         return None if driven is None else self.correction @ driven
 
-    def measured(self, stamp_ns: int, physical: Pose2) -> Difference | None:
+    def measured(self, stamp_ns: int, physical: Pose2, *, is_doubted: bool = False) -> Difference | None:
         """Take in where the physical robot was; None, and nothing is learnt, if that is not remembered.
 
-        If it is farther away than `reset_distance`, the next step goes all the way once it has settled there;
-        until then the virtual robot is left where it drives.
+        If it is farther away than `reset_distance`, the next step goes all the way once it has settled there,
+        where something else than localisation, if there is any, did not doubt it; until then the virtual
+        robot is left where it drives.
         """
-        self._settle(stamp_ns, physical)
+        self._settle(stamp_ns, physical, is_doubted=is_doubted)
         virtual, claimed = self.virtual_at(stamp_ns), self._at(stamp_ns, lambda noted: noted.claimed)
         if virtual is None or claimed is None:
             return None
@@ -124,11 +125,12 @@ class Follower:
         self._waits = is_far and not self._jumps
         return difference
 
-    def _settle(self, stamp_ns: int, physical: Pose2) -> None:
+    def _settle(self, stamp_ns: int, physical: Pose2, *, is_doubted: bool) -> None:
         found, self._found = self._found, (stamp_ns, physical)
-        if found is not None:
-            most = self.config.step + self.config.fastest * abs(stamp_ns - found[0]) * 1e-9
-            if found[1].distance(physical) <= most:
+        if found is not None and not is_doubted:
+            elapsed_ns = abs(stamp_ns - found[0])  # after a silence it may be anywhere, and another one
+            most = self.config.step + self.config.fastest * elapsed_ns * 1e-9
+            if elapsed_ns < self.config.settled_ns and found[1].distance(physical) <= most:
                 return
         self._settled_ns = stamp_ns
 

@@ -16,11 +16,13 @@ from twin.geometry import Pose2
 from twin.live.guard.client import GuardClient
 from twin.live.guard.gate import Velocity
 from twin.live.guard.verdict import Verdict
+from twin.live.mirror.claim import Claim
 from twin.live.mirror.divergence import DivergenceNode
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
 from twin.live.mirror.holding import Holding
 from twin.live.mirror.label import Evidence, LabelConfig, judge
 from twin.live.mirror.obedience import Obedience
+from twin.live.mirror.relocalising import Relocalising
 from twin.live.mirror.source import ClockChange, Source
 from twin.live.mirror.status import Status
 from twin.live.mirror.told import Told
@@ -52,7 +54,7 @@ class Event:
     stamp_ns: int
     """By the robot's clock."""
     what: str
-    """A name: `reset`, `clock`, `pace`, `values`, `grip`, `model`, `alarm`."""
+    """A name: `reset`, `clock`, `pace`, `values`, `grip`, `model`, `alarm`, `localisation`."""
     text: str
 
 
@@ -128,7 +130,9 @@ class MirroredRobot:
             node.create_subscription(Twist, COMMANDED, self._send, 10, frozen=True)
         self.told = Told(node, space)
         self._pose = node.create_publisher(PoseStamped, "pose", 10)
-        self.divergence = DivergenceNode(node, stack, self.tell)
+        self._claim = Claim.of(stack, world)
+        self.divergence = DivergenceNode(node, stack, self._claim, self.tell)
+        self._relocalising = Relocalising(node, space) if self._is_localised_here else None
         node.create_task(self._run())
 
     def status(self, now_ns: int, source: Source) -> Status:
@@ -175,7 +179,7 @@ class MirroredRobot:
             by_ns = change.set_by_ns if change.robot is None else 0  # of several robots none has our clock
             self.follower.forget()
             self.obedience.forget()
-            self.divergence.monitor.clock_set(by_ns)
+            self.divergence.clock_set(by_ns)
             self._pending.clear()
             self._latest_ns = -1
             self._stepped_ns = None
@@ -195,6 +199,10 @@ class MirroredRobot:
         self.follower.note(now_ns, virtual)
         self._driven = self.follower.correction.inverse() @ virtual
         self.divergence.place(now_ns, virtual, self._driven)
+        if self._relocalising is not None:
+            asked = self._relocalising.update(now_ns, self.divergence.monitor.lost)
+            if asked:
+                self.tell("localisation", asked)
         while self._pending and self._pending[0][0] <= now_ns:
             self._measure(*self._pending.popleft())
         elapsed_s = 0.0 if self._stepped_ns is None else (now_ns - self._stepped_ns) * 1e-9
@@ -255,7 +263,8 @@ class MirroredRobot:
             self._T_odom_driven = odometry @ virtual.inverse() @ follower.correction
         if physical is None:
             return
-        difference = self.follower.measured(stamp_ns, physical)
+        is_doubted = self.divergence.monitor.doubts_localisation
+        difference = self.follower.measured(stamp_ns, physical, is_doubted=is_doubted)
         if difference is None:
             return
         self.difference, self._physical = difference, physical
@@ -279,13 +288,12 @@ class MirroredRobot:
                 continue  # repeated, or overtaken
             self._latest_ns = stamp_ns
             self.told.late((self.node.now_ns - stamp_ns) * 1e-9)
-            T_world_odom = self._T_world_odom()
-            self._pending.append((stamp_ns, pose, None if T_world_odom is None else T_world_odom @ pose))
-
-    def _T_world_odom(self) -> Pose2 | None:
-        stack = self.stack
-        found = stack.robot_pose.relative(stack.frames.map, stack.frames.odom)
-        return stack.context.start if found is None and not self._is_localised_here else found
+            T_map_odom = self.stack.robot_pose.relative(frames.map, frames.odom)
+            if T_map_odom is not None and self._claim is not None:
+                self._claim.say(stamp_ns, T_map_odom @ pose)
+            if T_map_odom is None and not self._is_localised_here:
+                T_map_odom = self.stack.context.start
+            self._pending.append((stamp_ns, pose, None if T_map_odom is None else T_map_odom @ pose))
 
     def _on_joints(self, message: JointState) -> None:
         for name, position in zip(message.name, message.position, strict=False):
