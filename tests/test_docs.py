@@ -47,6 +47,7 @@ SLOW = {
     "docs/arenas.md",
     "docs/ros/commands.md",
     "docs/ros/clouds.md",
+    "docs/watch.md",
 }
 """Pages whose commands take longer than some seconds."""
 
@@ -66,6 +67,7 @@ NOT_RUN = {
     r"twin fork .*|twin run warehouse --pace 1 --listen .*": "need each other: tests/live/futures has both",
     r"twin view \S+ --(web|watch)": "serves until it is stopped: only its options are looked at",
     r"twin run \S+ --view": "waits for its user: tests/cli/test_watching.py does that",
+    r"twin watch( --web .*| --topics .*)?": "opens a viewer: tests/cli/ros/test_watch.py saves instead",
     r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",
     r"twin bench .*": "needs ../shared/data: tests/benchmarks has small ones",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/cli/ros/bag/test_bag_commands.py has one",

@@ -68,6 +68,7 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/slam/trial.py": {"perf_counter"},  # times faster than the robot drove
     "twin/experiments/pytest_plugin.py": {"now"},  # the name of a folder of runs
     "twin/experiments/report/page.py": {"now"},  # when the page was written
+    "twin/cli/ros/watch.py": {"monotonic"},  # how long is watched
     "twin/cli/run/folders.py": {"now"},  # the name of a run's folder
 }
 """Where the wall clock may be read, and by which function."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,12 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
 from twin.recording.columns import TIMELINE
-from twin.recording.extents import RobotBox, Stage
+from twin.recording.extents import Floor, RobotBox, Stage
 from twin.recording.frames import WORLD
 from twin.recording.map_eye import MAP_EYE, MAP_IMAGE
 
 _RASTERS = ("map", "global_costmap/costmap", "local_costmap/costmap")
+_COSTS = ("global_costmap/costmap",)
 DARK = rrb.Background(kind="SolidColor", color=(38, 42, 48))
 _LEAST_STAGE = 2.5
 """Size of the floor that the camera looks at [m], at least."""
@@ -57,7 +58,7 @@ def layout(
         plots = [apart, plots[0]]
         texts.insert(0, rrb.TextDocumentView(name="Mirror", origin="/mirror/status"))
     left = rrb.Vertical(
-        _simulation(stage, names),
+        _whole("Simulation", stage, names),
         _mission(names, end_ns),
         rrb.Horizontal(
             rrb.Tabs(
@@ -68,15 +69,51 @@ def layout(
         ),
         row_shares=[5, 1.8, 2.6],
     )
-    seen = [rrb.Spatial2DView(name=_camera_name(entity), origin=entity) for entity in pictures]
-    close_ups: list[Any] = [rrb.Tabs(*(_close_up(box) for box in robots))] if robots else []
-    if seen:
-        close_ups = [rrb.Horizontal(*close_ups, rrb.Tabs(*seen))]
-    right = rrb.Vertical(
-        *close_ups,
-        _from_above(names),
-        rrb.Tabs(*texts),
+    right = rrb.Vertical(*_close_ups(robots, pictures), _from_above(names), rrb.Tabs(*texts))
+    return _screen(left, right)
+
+
+def graph_layout(
+    floor: Floor,
+    names: Sequence[str],
+    robots: Sequence[RobotBox],
+    pictures: Sequence[str],
+    texts: Mapping[str, str],
+) -> rrb.Blueprint:
+    """Return the screen of a graph: as that of a run, without what only a simulator knows.
+
+    Args:
+        floor: To show.
+        names: Of robots.
+        robots: Those that are drawn; each has a close-up.
+        pictures: Entities of what cameras see.
+        texts: Entities of messages to read, and what they are called.
+    """
+    left = rrb.Vertical(
+        _whole("World", floor, names, _COSTS),
+        rrb.Horizontal(
+            _plot("Forward velocity [m/s]", [f"/velocity/{name}/linear/**" for name in names], None),
+            _plot("Turning velocity [rad/s]", [f"/velocity/{name}/angular/**" for name in names], None),
+            _plot("Joints [m, rad]", ["/joints/**"], None),
+        ),
+        row_shares=[5, 1.8],
     )
+    below: list[Any] = [_log(), _mission(names, None)]
+    below += [rrb.TextDocumentView(name=name, origin=entity) for entity, name in texts.items()]
+    right = rrb.Vertical(*_close_ups(robots, pictures, _COSTS), _from_above(names), rrb.Tabs(*below))
+    return _screen(left, right)
+
+
+def _close_ups(
+    robots: Sequence[RobotBox], pictures: Sequence[str], hidden: Sequence[str] = _RASTERS
+) -> list[Any]:
+    """Return what is at the top on the right: close-ups, and what cameras see beside them."""
+    seen = [rrb.Spatial2DView(name=_camera_name(entity), origin=entity) for entity in pictures]
+    close_ups: list[Any] = [rrb.Tabs(*(_close_up(box, hidden) for box in robots))] if robots else []
+    return [rrb.Horizontal(*close_ups, rrb.Tabs(*seen))] if seen else close_ups
+
+
+def _screen(left: rrb.Vertical, right: rrb.Vertical) -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[5, 3]),
         rrb.BlueprintPanel(state="collapsed"),
@@ -92,24 +129,31 @@ def _camera_name(entity: str) -> str:
     return entity.removeprefix("/cameras/").removesuffix("/compressed").removesuffix("/image_raw")
 
 
-def _simulation(stage: Stage, robots: Sequence[str]) -> rrb.Spatial3DView:
-    """Return the view of what truly happens, seen from the south side, above."""
+def _whole(
+    name: str, stage: Stage | Floor, robots: Sequence[str], hidden: Sequence[str] = _RASTERS
+) -> rrb.Spatial3DView:
+    """Return the view of all that happens, seen from the south side, above."""
     centre = (stage.low + stage.high) / 2.0
     width, length = stage.high - stage.low
     size = float(max(0.85 * width, 1.1 * length, _LEAST_STAGE))  # the view is wider than high
     position = (centre[0] - 0.1 * size, centre[1] - 0.7 * size, 0.52 * size)
     grid = rrb.LineGrid3D(visible=True, spacing=1.0, color=(110, 110, 110, 110))
-    return _world("Simulation", robots, WORLD, grid, orbit(position, (*centre, 0.0)))
+    return _world(name, robots, WORLD, grid, orbit(position, (*centre, 0.0)), hidden)
 
 
-def _close_up(box: RobotBox) -> rrb.Spatial3DView:
+def _close_up(box: RobotBox, hidden: Sequence[str]) -> rrb.Spatial3DView:
     """Return a view that travels with a robot, in the frame of its base, from as far as its size asks for."""
     eye = orbit(box.centre + _CLOSE_UP_DISTANCE * box.size * _CLOSE_UP, box.centre)
-    return _world(box.robot, [box.robot], box.base, rrb.LineGrid3D(visible=False), eye)
+    return _world(box.robot, [box.robot], box.base, rrb.LineGrid3D(visible=False), eye, hidden)
 
 
 def _world(
-    name: str, robots: Sequence[str], frame: str, grid: rrb.LineGrid3D, eye: rrb.EyeControls3D
+    name: str,
+    robots: Sequence[str],
+    frame: str,
+    grid: rrb.LineGrid3D,
+    eye: rrb.EyeControls3D,
+    hidden: Sequence[str],
 ) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         name=name,
@@ -120,7 +164,7 @@ def _world(
             "+ /trails/**",
             "+ /ros/**",
             "+ /cameras/**",
-            *_rasters(robots),
+            *_without(robots, hidden),
         ],
         overrides=_whole_trails(robots),
         background=DARK,
@@ -182,10 +226,10 @@ def _time_axis(end_ns: int | None, room: float) -> rrb.TimeAxis | None:
     return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
 
 
-def _rasters(robots: Sequence[str]) -> list[str]:
+def _without(robots: Sequence[str], rasters: Sequence[str]) -> list[str]:
     """Return what leaves maps out."""
     spaces = ("", *(f"/{robot}" for robot in robots))
-    return [f"- /ros{space}/{raster}" for space in spaces for raster in _RASTERS]
+    return [f"- /ros{space}/{raster}" for space in spaces for raster in rasters]
 
 
 def _whole_trails(robots: Sequence[str]) -> dict[Any, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -88,6 +88,15 @@ def robot_box(world: World, shapes: Iterable[BodyShape], robot: str) -> RobotBox
     low, high = bounds(own, lambda body: T_base_world @ world.pose(body))
     low, high = np.minimum(low, -_LEAST_ROBOT / 2.0), np.maximum(high, _LEAST_ROBOT / 2.0)
     return RobotBox(robot=robot, base=base, low=low, high=high)
+
+
+class Floor(NamedTuple):
+    """A rectangle of floor that views show."""
+
+    low: Array
+    """x, y [m], shape (2,)."""
+    high: Array
+    """x, y [m], shape (2,)."""
 
 
 class Stage:

@@ -153,6 +153,11 @@ class LiveScreen:
             self._lags = True
             self._tell("the viewer does not read: what it misses is dropped, and everything else goes on")
 
+    @property
+    def waiting(self) -> int:
+        """How many blocks wait for a viewer to read."""
+        return self._acts.qsize()
+
     def finish(self) -> None:
         """Send what waits, if the viewer reads; nothing more will come. Harmless when repeated."""
         if self._thread is not None and not self._gone:

@@ -210,9 +210,14 @@ def _not_whole(target: Path | str | None) -> RecordingError:
     return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")
 
 
+def declare_up(recording: rr.RecordingStream) -> None:
+    """Log which way is up."""
+    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+
 def declare_frames(recording: rr.RecordingStream, frames: Frames) -> None:
     """Log which way is up, and that every robot's map is where the world is."""
-    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    declare_up(recording)
     for namespace in ("",) if len(frames.robots) < 2 else ("", *frames.robots):
         child = frames.belief(namespace, "map")
         recording.log(

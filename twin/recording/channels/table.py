@@ -23,6 +23,7 @@ from twin.recording.channels.spatial import (
     PoseArrayChannel,
     ScanChannel,
 )
+from twin.recording.frames import Frames
 
 _BY_TYPE: dict[str, type[Any]] = {
     "sensor_msgs/msg/LaserScan": ScanChannel,
@@ -53,6 +54,10 @@ SHOWN_TYPES = frozenset(_BY_TYPE) | {msgtype for _, msgtype in _BY_NAME}
 
 def open_channel(context: Context, topic: str, msgtype: str) -> Channel[Any] | None:
     """Return how a topic is drawn, or None for a topic that a recording does not show."""
-    namespace, name = context.frames.split(topic)
-    kind = _BY_TYPE.get(msgtype) or _BY_NAME.get((name, msgtype))
-    return None if kind is None else kind(context, namespace, topic)
+    kind = kind_of(context.frames, topic, msgtype)
+    return None if kind is None else kind(context, context.frames.split(topic)[0], topic)
+
+
+def kind_of(frames: Frames, topic: str, msgtype: str) -> type[Any] | None:
+    """Return what draws a topic."""
+    return _BY_TYPE.get(msgtype) or _BY_NAME.get((frames.split(topic)[1], msgtype))

@@ -1,0 +1,1 @@
+"""Any ROS 2 graph on a screen: `twin watch`."""
