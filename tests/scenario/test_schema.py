@@ -232,3 +232,18 @@ def test_json_schema_describes_every_key() -> None:
     bad = yaml.safe_load(GOOD) | {"chekcs": []}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(bad, schema)
+
+
+def test_a_tag_that_does_not_exist_and_one_that_nobody_could_see(tmp_path: Path) -> None:
+    text = """\
+name: demo
+duration: 1 s
+world:
+  tags: [{id: 587, size: 16 cm, pose: {x: 1}}]
+robots: [{model: diff_bot, cameras: "off", apriltag: {}}]
+checks: [{no_collision: }]
+"""
+    assert faults(tmp_path, text) == [
+        "demo.yaml:4: tag36h11 has the ids 0 to 586, not 587",
+        "demo.yaml:5: tags are found in images, but this robot's cameras are off",
+    ]

@@ -108,6 +108,8 @@ if TYPE_CHECKING:
     GripperCommandMsg: Any
     JointTolerance: Any
     JointTrajectoryControllerState: Any
+    AprilTagDetection: Any
+    AprilTagDetectionArray: Any
 
 _NAMES = {
     "action_msgs": "GoalInfo GoalStatus GoalStatusArray",
@@ -146,6 +148,7 @@ _NAMES = {
     "map_msgs": "OccupancyGridUpdate",
     "explore_lite_msgs": "ExploreStatus",
     "control_msgs": "GripperCommand JointTolerance JointTrajectoryControllerState",
+    "apriltag_msgs": "AprilTagDetection AprilTagDetectionArray",
 }
 """Package -> its messages that are here."""
 _ALIASES = {"GripperCommand": "GripperCommandMsg"}

@@ -41,11 +41,11 @@ from twin.scenario.observation import CheckContext, Zone
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
-from twin.scenario.world import Obstacle
+from twin.scenario.world import Obstacle, TagEntry
 from twin.sim.drive_check import calibrated_track_ratio
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody
+from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody, Tag
 from twin.sim.world import World
 
 if TYPE_CHECKING:
@@ -245,14 +245,17 @@ def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) 
     statics = [o for o in obstacles if isinstance(o, StaticBody)]
     movable = [o for o in obstacles if isinstance(o, FreeBody)]
     placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
+    tags = tuple(map(_tag, scenario.world.tags))
     if arena is None:
-        return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed)
+        return Scene(
+            name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed, tags=tags
+        )
     carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
     totes = (task.tote for mission in carriers for task in mission.tasks)
     given = {good.name: good.properties for good in scenario.world.goods}
     scene = arena.scene({*given, *totes}, seed=scenario.seed, obstacles=statics)
     goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]
-    return replace(scene, goods=(*goods, *movable), placed=placed)
+    return replace(scene, goods=(*goods, *movable), placed=placed, tags=tags)
 
 
 def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeBody | PlacedBody:
@@ -265,6 +268,16 @@ def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeB
     moves = hidden or obstacle.route is not None
     kind = PlacedBody if moves else StaticBody
     return kind(name=name, T_world_body=pose, shapes=shapes, friction=friction)
+
+
+def _tag(entry: TagEntry) -> Tag:
+    return Tag(
+        name=entry.name or f"{entry.family}:{entry.id}",
+        family=entry.family,
+        number=entry.id,
+        size=entry.size,
+        T_world_tag=entry.pose.pose,
+    )
 
 
 def _maps(robots: Sequence[RobotConfig], arena: Arena | None) -> dict[str, OccupancyMap]:

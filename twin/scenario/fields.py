@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from twin.errors import nearest
-from twin.geometry import Pose2
+from twin.geometry import Pose2, Pose3
 from twin.parameters import Metres, Radians
 from twin.strict_yaml import Fault, Faults, StrictModel
 
@@ -96,6 +96,28 @@ class PoseConfig(StrictModel):
     def pose(self) -> Pose2:
         """The pose as geometry."""
         return Pose2(self.x, self.y, self.yaw)
+
+
+class SpacePoseConfig(StrictModel):
+    """A pose in space, in `map`."""
+
+    x: Metres = 0.0
+    """Position along x [m]."""
+    y: Metres = 0.0
+    """Position along y [m]."""
+    z: Metres = 0.0
+    """Height [m]."""
+    roll: Radians = 0.0
+    """Rotation about x, first [rad]."""
+    pitch: Radians = 0.0
+    """Rotation about y, then [rad]."""
+    yaw: Radians = 0.0
+    """Rotation about z, last [rad]."""
+
+    @property
+    def pose(self) -> Pose3:
+        """The pose as geometry."""
+        return Pose3.from_xyz_rpy((self.x, self.y, self.z), (self.roll, self.pitch, self.yaw))
 
 
 class OneOf(StrictModel):

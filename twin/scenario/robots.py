@@ -14,9 +14,11 @@ from twin.strict_yaml import Fault, StrictModel
 from twin.strict_yaml.later import later
 
 if TYPE_CHECKING:
+    from twin.scenario.apriltag import AprilTagParameters
     from twin.scenario.navigation import NavigationConfig
-else:  # most robots of small scenarios have none, and it is as much as all the rest
+else:  # most robots of small scenarios have neither, and it is as much as all the rest
     NavigationConfig = later("twin.scenario.navigation:NavigationConfig")
+    AprilTagParameters = later("twin.scenario.apriltag:AprilTagParameters")
 
 
 class RobotConfig(StrictModel):
@@ -45,6 +47,8 @@ class RobotConfig(StrictModel):
     cameras: Literal["off", "optional", "required"] | None = None
     """Whether its cameras make images. `off`: none; `optional`: none on a computer that cannot draw them;
     `required`: on such a computer the run fails; absent: it fails if a node, a bag or a check wants one."""
+    apriltag: AprilTagParameters | None = None
+    """What finds tags in the images of a camera; absent: nothing, `{}`: all defaults."""
     detector: DetectorEntry | None = None
     """What finds the boxes that its gripper is to take; absent: `box_faces`."""
 
@@ -64,5 +68,7 @@ class RobotConfig(StrictModel):
             yield Fault(("start",), "give the robot either a pose or the name of a start, not both")
         if self.navigation is not None and not self.is_localised:
             yield Fault(("navigation",), "navigation needs a localisation of type odometry, amcl or slam")
+        if self.apriltag is not None and self.cameras == "off":
+            yield Fault(("apriltag",), "tags are found in images, but this robot's cameras are off")
         if self.navigation is not None and self.base != "free":
             yield Fault(("base",), f"navigation needs the base 'free', not '{self.base}'")

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from twin.parameters import Hertz, Kilograms, Metres, MetresPerSecond, NotNegative, Positive, Seconds
-from twin.scenario.fields import NameOrPath, PoseConfig, RosName, faultless, known
+from twin.perception.tags.families import FAMILIES, FamilyName
+from twin.scenario.fields import NameOrPath, PoseConfig, RosName, SpacePoseConfig, faultless, known
 from twin.strict_yaml import Fault, StrictModel
 from twin.warehouse.catalogue import catalogue
 
@@ -49,6 +50,27 @@ class Obstacle(StrictModel):
             yield Fault(("appears_within",), said)
 
 
+class TagEntry(StrictModel):
+    """A printed tag with a number, which only cameras see."""
+
+    name: str | None = None
+    """What the world calls it; absent: its family and id, as `tag36h11:3`."""
+    family: FamilyName = "tag36h11"
+    """Of which tags it is one: AprilTag's, or one of OpenCV's dictionaries of ArUco."""
+    id: Annotated[int, NotNegative]
+    """Its number."""
+    size: Length
+    """Side of its black border, as AprilTag counts; around it is as much white as one module [m]."""
+    pose: SpacePoseConfig
+    """Middle of its face, in the world; x out of the face, z up along it."""
+
+    @faultless
+    def _exists(self) -> Iterator[Fault]:
+        count = FAMILIES[self.family].count
+        if self.id >= count:
+            yield Fault(("id",), f"{self.family} has the ids 0 to {count - 1}, not {self.id}")
+
+
 class GoodOverride(StrictModel):
     """Properties of one of the arena's goods in this run; absent keys keep the arena's."""
 
@@ -74,6 +96,8 @@ class WorldConfig(StrictModel):
     """Boxes added to the arena, on no map."""
     goods: tuple[GoodOverride, ...] = ()
     """Goods that differ from the arena's."""
+    tags: tuple[TagEntry, ...] = ()
+    """Printed tags for cameras."""
 
 
 class PhysicsConfig(StrictModel):

@@ -65,6 +65,10 @@ class RobotStack:
         self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
         self.navigator: BtNavigatorNode | None = None
         self.slam: SlamToolboxNode | None = None
+        if context.config.apriltag is not None:
+            from twin.runtime.stacks.apriltag import build_apriltag
+
+            build_apriltag(context, context.config.apriltag)
         self._build_autonomy()
         self._build_arm(description)
         if self.filter is not None:
