@@ -156,6 +156,7 @@ def test_a_parameter_file_of_nav2_names_one_of_each_kind(
         "static_layer",
         "hole",
         "obstacle_layer",
+        "voxel_layer",
         "range_sensor_layer",
         "inflation_layer",
     )

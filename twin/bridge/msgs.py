@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     CostmapFilterInfo: Any
     CostmapMetaData: Any
     CostmapUpdate: Any
+    VoxelGrid: Any
     OccupancyGridUpdate: Any
     BehaviorTreeLog: Any
     BehaviorTreeStatusChange: Any
@@ -143,7 +144,7 @@ _NAMES = {
     "visualization_msgs": "Marker MarkerArray",
     "nav2_msgs": (
         "CollisionMonitorState Costmap CostmapFilterInfo CostmapMetaData CostmapUpdate BehaviorTreeLog "
-        "BehaviorTreeStatusChange Particle ParticleCloud SpeedLimit"
+        "BehaviorTreeStatusChange Particle ParticleCloud SpeedLimit VoxelGrid"
     ),
     "map_msgs": "OccupancyGridUpdate",
     "explore_lite_msgs": "ExploreStatus",

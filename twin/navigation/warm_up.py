@@ -35,6 +35,19 @@ def warm_up_costmap() -> None:
 
 @ahead
 @cache
+def warm_up_voxels() -> None:
+    """Let a cloud into both layers that take one."""
+    from twin.navigation.costmaps.observation import Observation, ObservationSource
+
+    layered, points = _costmap(), np.array([[0.5, 1.0, 0.5]])
+    for layer in ("voxel_layer", "obstacle_layer"):
+        source = ObservationSource(topic="points", layer=layer, clearing=True)
+        seen = Observation(points=points, sensor=(1.0, 1.0, 0.5), source=source)
+        layered.observe([seen], Pose2(1.0, 1.0, 0.0))
+
+
+@ahead
+@cache
 def warm_up_odometry_watch() -> None:
     """Let scans of a corner contradict odometry, so that their motion is looked for."""
     from twin.navigation.odometry_watch import OdometryWatch

@@ -11,8 +11,8 @@ from twin.bridge.msgs import LaserScan, PoseArray, header, new, ns
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetBool
 from twin.navigation.docking.faces import BoxFaces, Detector
-from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.scan_input import scan_points
 
 
 class ToteDetectorNode:

@@ -28,7 +28,7 @@ _BELOW_M = 20.0
 
 
 def standing_pose(obstacle: Obstacle) -> Pose3:
-    """Return the pose of an obstacle's centre when it stands on the floor where it starts."""
+    """Return the pose of an obstacle's centre when it stands where it starts."""
     return _on_floor(obstacle, obstacle.pose.pose)
 
 
@@ -270,7 +270,7 @@ def _soon(before: Sequence[Pose2], bases: Sequence[Pose2], elapsed: float) -> li
 
 
 def _on_floor(obstacle: Obstacle, pose: Pose2) -> Pose3:
-    return Pose3.from_pose2(pose, obstacle.size[2] / 2.0)
+    return Pose3.from_pose2(pose, obstacle.underside + obstacle.size[2] / 2.0)
 
 
 def _distance(obstacle: Obstacle, pose: Pose2, base: Pose2) -> float:

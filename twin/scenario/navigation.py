@@ -12,12 +12,14 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from twin.navigation.costmaps.costmap_config import LAYERS as SHIPPED_LAYERS
+from twin.navigation.costmaps.observation import ObservationSource
 from twin.navigation.planning.config import CommitmentConfig, GoalAccessConfig
 from twin.navigation.plugins import LAYERS, PLANNERS, SMOOTHERS, TREE_NODES, configs_of
 from twin.nodes.navigation.bt_navigator_config import BtNavigatorConfig
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.planning.config import PlannerServerConfig
 from twin.parameters import Hertz, Le, MetresPerSecond, Positive, RadiansPerSecond
+from twin.parameters.placed import overridden
 from twin.scenario.collision_monitor import CollisionMonitorParameters
 from twin.scenario.controllers import ControllerId, ControllerParameters, FurtherControllerParameters
 from twin.scenario.docking import DockingParameters
@@ -91,11 +93,27 @@ class SmootherParameters(PluginGroup):
         return {"plugin"}
 
 
+@keys_of(ObservationSource, whole=True)
+class ObservationSourceParameters(ParameterGroup):
+    """A topic of points for a layer of a costmap."""
+
+    @model_validator(mode="after")
+    def _can_be(self) -> ObservationSourceParameters:
+        self.config()
+        return self
+
+    def config(self) -> ObservationSource:
+        """Return the source."""
+        return overridden(ObservationSource(topic=self.topic), self.overrides())
+
+
 @keys_of(CostmapNodeConfig, later=True)
 class CostmapParameters(PluginListGroup):
     """Parameters of a costmap; those of a layer of yours stand beside `plugins`, by the name of its class."""
 
     list_of, list_key = LAYERS, "plugins"
+    observation_sources: Sequence[ObservationSourceParameters] | None = None
+    """Topics of points, for the voxel layer and the obstacle layer."""
 
     @classmethod
     def ships(cls, data: Mapping[str, Any]) -> Collection[str]:

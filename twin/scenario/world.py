@@ -17,7 +17,7 @@ Length = Annotated[Metres, Positive]
 
 
 class Obstacle(StrictModel):
-    """A box on the floor that no map shows."""
+    """A box, on the floor or above it, that no map shows."""
 
     name: RosName
     """Name of its body."""
@@ -25,6 +25,8 @@ class Obstacle(StrictModel):
     """Where its footprint's centre stands, in the world."""
     size: tuple[Length, Length, Length]
     """Extent along its x, y and z [m]."""
+    underside: Annotated[Metres, NotNegative] = 0.0
+    """Where it begins, above the floor [m]: a table top, a fork, a load that hangs."""
     mass: Annotated[Kilograms, Positive] | None = None
     """Mass of a box that can be pushed [kg]; absent: it never moves."""
     friction: Annotated[float, NotNegative] = 0.8
@@ -48,6 +50,8 @@ class Obstacle(StrictModel):
         elif self.appears_within is not None and self.mass is not None:
             said = "an obstacle that appears later cannot be pushed; give it no mass"
             yield Fault(("appears_within",), said)
+        if self.underside and self.mass is not None:
+            yield Fault(("underside",), "a box that can be pushed stands on the floor; give it no mass")
 
 
 class TagEntry(StrictModel):

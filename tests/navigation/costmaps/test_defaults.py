@@ -35,6 +35,7 @@ def test_who_may_drive_out_of_a_keepout_zone_pays_the_dearest_cost_that_is_free(
     [
         ("global_costmap", CONFIG, 21),
         ("global_costmap.range_sensor_layer", CONFIG.range_sensor_layer, 5),
+        ("global_costmap.voxel_layer", CONFIG.voxel_layer, 9),
         ("global_costmap.keepout_filter", CONFIG.keepout_filter, 2),
     ],
 )

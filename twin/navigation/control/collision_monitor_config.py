@@ -59,6 +59,28 @@ class MonitorPolygon:
             raise ValueError(f"points must be three corners or more, at most {_MOST_CORNERS}")
 
 
+@dataclass(frozen=True, kw_only=True)
+class MonitorCloud:
+    """A topic of point clouds that the monitor looks at; names and defaults are Nav2's.
+
+    Raises:
+        ValueError: min_height is above max_height, or the topic is none.
+    """
+
+    topic: str
+    """Of sensor_msgs/PointCloud2."""
+    min_height: Metres = 0.05
+    """Lowest point that is looked at, above the base frame."""
+    max_height: Metres = 0.5
+    """Highest point that is looked at."""
+
+    def __post_init__(self) -> None:
+        if not self.topic.strip("/"):
+            raise ValueError("topic must name a topic")
+        if self.min_height > self.max_height:
+            raise ValueError(f"min_height is {self.min_height:g}, more than max_height, {self.max_height:g}")
+
+
 FOOTPRINT_APPROACH = MonitorPolygon(name="FootprintApproach", action_type="approach", min_points=3)
 
 

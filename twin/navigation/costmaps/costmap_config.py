@@ -23,7 +23,7 @@ from twin.parameters import (
     Seconds,
 )
 
-LAYERS = ("static_layer", "obstacle_layer", "range_sensor_layer", "inflation_layer")
+LAYERS = ("static_layer", "obstacle_layer", "voxel_layer", "range_sensor_layer", "inflation_layer")
 """Those that ship, as Nav2 orders them."""
 _MOST_CELLS = 4000
 """Along an edge of a rolling costmap."""
@@ -54,6 +54,31 @@ class RangeSensorConfig:
                 f"clear_threshold is {self.clear_threshold:g}, more than mark_threshold, "
                 f"{self.mark_threshold:g}"
             )
+
+
+@dataclass(frozen=True, kw_only=True)
+class VoxelConfig:
+    """Parameters of the layer; names and defaults are those of nav2_costmap_2d's VoxelLayer."""
+
+    enabled: bool = True
+    """Whether its sources are listened to."""
+    origin_z: Annotated[Metres, Interval(ge=-1000.0, le=1000.0)] = 0.0
+    """Where the lowest voxel begins; what is below is taken to be in it."""
+    z_resolution: Annotated[Metres, Interval(ge=0.005, le=100.0)] = 0.2
+    """Height of a voxel."""
+    z_voxels: Annotated[int, Interval(ge=1, le=16)] = 10
+    """Voxels of a column; what is above them is not marked."""
+    unknown_threshold: Annotated[int, Interval(ge=0, le=16)] = 15
+    """A cell whose column has more unknown voxels is unknown when a ray has passed it."""
+    mark_threshold: Annotated[int, Interval(ge=0, le=16)] = 0
+    """A cell is lethal if its column has more marked voxels."""
+    combination_method: Annotated[int, Interval(ge=0, le=2)] = 1
+    """0: what it knows goes before the layers before it; 1: the higher cost; 2: the higher cost, where those
+    know something."""
+    footprint_clearing_enabled: bool = True
+    """Whether the cells under the robot are free."""
+    publish_voxel_map: bool = False
+    """Whether `voxel_grid` is published with the costmap."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +148,8 @@ class CostmapConfig:
     """Layers in their order. Zones are before or after all of them, as `keepout_before_inflation` says."""
     own_layers: Annotated[Mapping[str, Any], Flat] = field(default_factory=dict)
     """Parameters of layers that a user brings, by the names that `plugins` has for them."""
+    voxel_layer: VoxelConfig = field(default_factory=VoxelConfig)
+    """Of the layer of point clouds."""
     range_sensor_layer: RangeSensorConfig = field(default_factory=RangeSensorConfig)
     """Of the layer of sonars and infrared sensors."""
     keepout_filter: KeepoutConfig = field(default_factory=KeepoutConfig)

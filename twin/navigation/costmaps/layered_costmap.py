@@ -1,9 +1,9 @@
-"""Costmaps kept up to date from a map, scans, range sensors and masks, layer by layer as Nav2's."""
+"""Costmaps kept up to date from a map, scans, clouds, range sensors and masks, layer by layer as Nav2's."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,9 +16,11 @@ from twin.navigation.costmaps.costmap_config import CostmapConfig
 from twin.navigation.costmaps.filters import KeepoutFilter
 from twin.navigation.costmaps.inflation import Inflation
 from twin.navigation.costmaps.kernels import Cells
-from twin.navigation.costmaps.layer import CellLayer, Layer
+from twin.navigation.costmaps.layer import CellLayer, Layer, SensedLayer
+from twin.navigation.costmaps.observation import Observation
 from twin.navigation.costmaps.obstacle_layer import ObstacleLayer
 from twin.navigation.costmaps.range_sensor_layer import RangeSensorLayer
+from twin.navigation.costmaps.voxel_layer import Columns, VoxelLayer
 from twin.navigation.costmaps.window import NOTHING, Window, everything
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.navigation.plugins import LAYERS, create
@@ -36,7 +38,7 @@ class _Zones(CellLayer):
 
 @dataclass(kw_only=True)
 class LayeredCostmap:
-    """Layers, and the master grid that they make: static, obstacles, range sensors, keep-out, inflation.
+    """Layers, and the master grid that they make, as `LAYERS` has them, with keep-out zones before inflation.
 
     What comes in only notes the window that it changed; `costmap` combines and inflates that window, once,
     when it is asked for. So a scan costs what it changed, and a window that rolls twice is inflated once.
@@ -80,6 +82,7 @@ class LayeredCostmap:
         )
         self._own = {name: create(LAYERS, own) for name, own in config.own_layers.items()}
         self._obstacles = ObstacleLayer(self.shape)
+        self._voxels: VoxelLayer | None = None
         self._ranges: RangeSensorLayer | None = None
         self._keepout: Cells | None = None
         self._known: Costmap | None = None
@@ -92,6 +95,7 @@ class LayeredCostmap:
         zones: list[Layer] = [] if self._keepout is None else [_Zones(self._keepout)]
         there: dict[str, Layer | None] = {
             "obstacle_layer": self._obstacles,
+            "voxel_layer": self._voxels,
             "range_sensor_layer": self._ranges,
             **self._own,
         }
@@ -142,6 +146,32 @@ class LayeredCostmap:
         if robot is not None and config.footprint_clearing_enabled:
             self._touch(self._obstacles.clear_polygon(robot.apply(self._polygon), self._grid.frame))
 
+    def observe(self, observations: Sequence[Observation], robot: Pose2 | None = None) -> None:
+        """Clear along the rays of clouds and mark their points, each in the layer of its source.
+
+        Args:
+            observations: All that is to be taken at a time: no ray clears what another one of them marks.
+            robot: Pose of the base in the costmap's frame; the cells under its footprint become free.
+        """
+        frame, polygon = self._grid.frame, None if robot is None else robot.apply(self._polygon)
+        flat = [one for one in observations if one.source.layer == "obstacle_layer"]
+        voxels = [one for one in observations if one.source.layer == "voxel_layer"]
+        if flat:
+            self._touch(self._obstacles.observe(flat, frame))
+            if polygon is not None and self.config.footprint_clearing_enabled:
+                self._touch(self._obstacles.clear_polygon(polygon, frame))
+        if voxels:
+            if self._voxels is None:
+                self._voxels = VoxelLayer(self.shape, self.config.voxel_layer)
+            self._touch(self._voxels.observe(voxels, frame))
+            if polygon is not None and self.config.voxel_layer.footprint_clearing_enabled:
+                self._touch(self._voxels.clear_polygon(polygon, frame))
+
+    @property
+    def columns(self) -> Columns | None:
+        """The columns of the voxel layer, shape (height, width); None until it has seen something."""
+        return None if self._voxels is None else self._voxels.columns
+
     def update_range(
         self, sensor: Pose2, distance: float, limits: tuple[float, float], field_of_view: float
     ) -> None:
@@ -181,9 +211,8 @@ class LayeredCostmap:
         dx, dy = column - width // 2, row - height // 2
         if dx == 0 and dy == 0:
             return
-        self._obstacles.move(dx, dy)
-        if self._ranges is not None:
-            self._ranges.move(dx, dy)
+        for layer in self._sensed():
+            layer.move(dx, dy)
         self._keepout = None  # the mask stays where it is: whoever has it lays it anew
         origin = (old.origin[0] + dx * old.resolution, old.origin[1] + dy * old.resolution)
         self._grid = replace(self._empty(), origin=origin)
@@ -214,6 +243,9 @@ class LayeredCostmap:
             for mine, others in zip(self._grid.origin, old._grid.origin, strict=True)
         )
         self._obstacles.adopt(old._obstacles, dx, dy)
+        if old._voxels is not None:
+            self._voxels = VoxelLayer(self.shape, self.config.voxel_layer)
+            self._voxels.adopt(old._voxels, dx, dy)
         if old._ranges is not None:
             self._ranges = RangeSensorLayer(self.shape, self.config.range_sensor_layer)
             self._ranges.adopt(old._ranges, dx, dy)
@@ -247,12 +279,19 @@ class LayeredCostmap:
     def _forget(self, window: Window, *, outside: bool) -> None:
         if window.empty and not outside:
             return
-        self._touch(self._obstacles.forget(window, outside=outside))
+        for sensed in self._sensed():
+            self._touch(sensed.forget(window, outside=outside))
         for layer in self._own.values():
             layer.reset()
             self._stale()
+
+    def _sensed(self) -> Iterator[SensedLayer]:
+        """Yield the layers that remember what sensors have seen."""
+        yield self._obstacles
+        if self._voxels is not None:
+            yield self._voxels
         if self._ranges is not None:
-            self._touch(self._ranges.forget(window, outside=outside))
+            yield self._ranges
 
     def _empty(self) -> Costmap:
         """Return a grid whose costs are to be written."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,7 +12,22 @@ from twin.navigation._jit import jit
 from twin.navigation.costmaps.costmap import LETHAL_OBSTACLE
 from twin.navigation.costmaps.kernels import Cells, Triple, trace_scan
 from twin.navigation.costmaps.layer import SensedLayer
-from twin.navigation.costmaps.window import Window, differing, everything
+from twin.navigation.costmaps.observation import Observation
+from twin.navigation.costmaps.window import NOTHING, Window, differing, everything
+
+_NEVER = (math.inf, 0.0)
+"""A range in which nothing is."""
+
+
+def window_around(centre: Sequence[float], reach: float, frame: Triple, shape: tuple[int, ...]) -> Window:
+    """Return the cells of a grid of `shape` (height, width) within a distance of a point [m]."""
+    x, y, resolution = frame
+    return Window(
+        math.floor((centre[0] - reach - x) / resolution),
+        math.floor((centre[1] - reach - y) / resolution),
+        math.floor((centre[0] + reach - x) / resolution) + 1,
+        math.floor((centre[1] + reach - y) / resolution) + 1,
+    ).clipped(shape)
 
 
 class ObstacleLayer(SensedLayer):
@@ -29,17 +45,31 @@ class ObstacleLayer(SensedLayer):
         frame: Triple,
     ) -> Window:
         """Clear along the rays of a scan and mark its points, as `trace_scan` does; return what changed."""
-        x, y, resolution = frame
-        reach = max(marking[1], clearing[1])
-        around = Window(
-            math.floor((sensor[0] - reach - x) / resolution),
-            math.floor((sensor[1] - reach - y) / resolution),
-            math.floor((sensor[0] + reach - x) / resolution) + 1,
-            math.floor((sensor[1] + reach - y) / resolution) + 1,
-        ).clipped(self.cells.shape)
+        around = window_around(sensor, max(marking[1], clearing[1]), frame, self.cells.shape)
         before = self.cells[around.slices].copy()
         trace_scan(self.cells, points, sensor, marking, clearing, frame)
         return Window(*differing(before, self.cells, around))
+
+    def observe(self, observations: Sequence[Observation], frame: Triple) -> Window:
+        """Clear along all rays, then mark all points; return what changed.
+
+        Only points of obstacles' heights are looked at: a ray above or below tells nothing of the cells that
+        it crosses.
+        """
+        changed, seen = NOTHING, list[tuple[Observation, Array]]()
+        for one in observations:
+            z, source = one.points[:, 2], one.source
+            there = (z >= source.min_obstacle_height) & (z <= source.max_obstacle_height)
+            seen.append((one, np.ascontiguousarray(one.points[there, :2])))
+        for one, points in seen:
+            if one.source.clearing:
+                limits = float(one.source.raytrace_min_range), float(one.source.raytrace_max_range)
+                changed = changed.joined(self.trace(points, one.sensor[:2], _NEVER, limits, frame))
+        for one, points in seen:
+            if one.source.marking:
+                limits = float(one.source.obstacle_min_range), float(one.source.obstacle_max_range)
+                changed = changed.joined(self.trace(points, one.sensor[:2], limits, _NEVER, frame))
+        return changed
 
     def mark(self, points: Array, frame: Triple) -> Window:
         """Mark the cells of points, shape (n, 2) [m], without a ray to them; return where that may matter."""

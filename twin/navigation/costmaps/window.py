@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.navigation._jit import jit
 from twin.navigation.costmaps.kernels import Cells
+
+Value = TypeVar("Value", bound=np.unsignedinteger)
 
 
 class Window(NamedTuple):
@@ -85,7 +88,7 @@ def raised(costs: Cells, layer: Cells) -> Cells:
     return higher
 
 
-def cut_out(cells: Cells, shape: tuple[int, ...], dx: int, dy: int, fill: int) -> Cells:
+def cut_out(cells: NDArray[Value], shape: tuple[int, ...], dx: int, dy: int, fill: int) -> NDArray[Value]:
     """Return the cells on a grid of `shape` (height, width) that begins (dx, dy) cells behind theirs.
 
     Cells of it that they do not reach get `fill`.

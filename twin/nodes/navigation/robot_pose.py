@@ -12,7 +12,7 @@ import numpy as np
 from twin.bridge.msgs import Header, Path, ns
 from twin.bridge.services.future import Future
 from twin.bridge.tf import TransformBuffer, TransformError
-from twin.geometry import Array, Pose2
+from twin.geometry import Array, Pose2, Pose3
 from twin.nodes.messages import path_array
 
 _MOST_EARLY = 5
@@ -53,6 +53,13 @@ class RobotPose:
     def at_stamp(self, target: str, header: Header) -> Pose2 | None:
         """Return the planar pose, in `target`, of the frame that a message was measured in, when it was."""
         return self.relative(target, header.frame_id, ns(header.stamp))
+
+    def place_at_stamp(self, target: str, header: Header) -> Pose3 | None:
+        """Return, as `at_stamp`, the whole pose: of what looks down or hangs high."""
+        try:
+            return self.buffer.lookup(target, header.frame_id, ns(header.stamp))
+        except TransformError:
+            return None
 
     def placed(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
         """Return a callback that waits until odometry tells where a message was measured.

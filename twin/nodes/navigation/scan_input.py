@@ -1,8 +1,13 @@
-"""A node's scans: since when none of use has come, and why."""
+"""A node's scans: where their rays end; since when none of use has come, and why."""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import numpy as np
+
 from twin.bridge.msgs import LaserScan
+from twin.geometry import Array
 from twin.navigation.scan_watch import ScanWatch
 from twin.nodes.navigation.robot_pose import RobotPose
 
@@ -34,3 +39,28 @@ class ScanInput:
         if not self._why or now_ns - self._heard_ns > tolerance_ns:
             return f"no scan for {missing * 1e-9:.1f} s"
         return f"no usable scan for {missing * 1e-9:.1f} s: {self._why}"
+
+
+def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
+    """Return the ends of a scan's rays in its frame, shape (n, 2).
+
+    Args:
+        message: The scan.
+        no_return: Where rays without return (inf, or beyond the sensor's range) end, so that they clear [m].
+        inf_is_valid: Whether they do; if not they are NaN, as those below the least range are.
+    """
+    ranges = message.ranges.astype(np.float64)
+    ranges[ranges > message.range_max] = no_return if inf_is_valid else np.nan
+    ranges[ranges < message.range_min] = np.nan
+    along, aside = _directions(message.angle_min, message.angle_increment, len(ranges))
+    points = np.empty((len(ranges), 2))
+    np.multiply(ranges, along, out=points[:, 0])
+    np.multiply(ranges, aside, out=points[:, 1])
+    return points
+
+
+@lru_cache(maxsize=64)
+def _directions(first: float, step: float, count: int) -> tuple[Array, Array]:
+    """Return x and y, shape (count,), of unit vectors along a lidar's rays, from their angles [rad]."""
+    angles = first + step * np.arange(count)
+    return np.cos(angles), np.sin(angles)

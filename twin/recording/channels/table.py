@@ -23,6 +23,7 @@ from twin.recording.channels.spatial import (
     PoseArrayChannel,
     ScanChannel,
 )
+from twin.recording.channels.voxels import VoxelChannel
 from twin.recording.frames import Frames
 
 _BY_TYPE: dict[str, type[Any]] = {
@@ -31,6 +32,7 @@ _BY_TYPE: dict[str, type[Any]] = {
     "nav_msgs/msg/OccupancyGrid": GridChannel,
     "map_msgs/msg/OccupancyGridUpdate": GridUpdateChannel,
     "nav_msgs/msg/Path": PathChannel,
+    "nav2_msgs/msg/VoxelGrid": VoxelChannel,
     "geometry_msgs/msg/PoseArray": PoseArrayChannel,
     "rcl_interfaces/msg/Log": LogChannel,
     "sensor_msgs/msg/CompressedImage": PictureChannel,

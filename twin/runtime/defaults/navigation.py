@@ -207,4 +207,8 @@ def _with_own(layers: CostmapConfig, group: CostmapParameters) -> CostmapConfig:
 def _costmap(config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
     if group.robot_radius is not None:
         config = replace(config, layers=replace(config.layers, footprint=()))
-    return group.over(config)
+    config = group.over(config)
+    if group.observation_sources is not None:
+        sources = tuple(source.config() for source in group.observation_sources)
+        config = replace(config, observation_sources=sources)
+    return config

@@ -45,7 +45,7 @@ def build_commands(
     scans = config.scan_topics
     if scans is None:
         scans = () if scan_lidar(context.handle.description) is None else (SCAN,)
-    if not config.enabled or not (scans or config.range_topics):
+    if not config.enabled or not (scans or config.range_topics or config.clouds):
         TwistMuxNode(bus, namespace=namespace)
         return
     TwistMuxNode(bus, output=_GUARDED, namespace=namespace)
@@ -62,6 +62,7 @@ def build_commands(
         cmd_vel_in=_GUARDED,
         scan_topics=scans,
         range_topics=config.range_topics,
+        clouds=tuple(cloud.config() for cloud in config.clouds),
         namespace=namespace,
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from twin.bridge.msgs import LaserScan, header
-from twin.nodes.navigation.costmaps.costmap import scan_points
+from twin.nodes.navigation.scan_input import scan_points
 
 
 @pytest.mark.parametrize("inf_is_valid", [True, False])

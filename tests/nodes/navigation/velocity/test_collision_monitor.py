@@ -10,14 +10,19 @@ import pytest
 
 from tests.nodes.conftest import Bench, Robot, open_room
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import CollisionMonitorState, Range, Twist, header, new
+from twin.bridge.msgs import CollisionMonitorState, PointCloud2, Range, Twist, header, new
+from twin.bridge.point_cloud2 import create_cloud_xyz32
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import Toggle
 from twin.controllers.limiter import AxisLimits
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Pose2
 from twin.navigation.control.collision_monitor import Action, CollisionMonitor, time_to_collision
-from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig, MonitorPolygon
+from twin.navigation.control.collision_monitor_config import (
+    CollisionMonitorConfig,
+    MonitorCloud,
+    MonitorPolygon,
+)
 from twin.navigation.costmaps.footprint import rectangle
 from twin.nodes.navigation.velocity.collision_monitor import CollisionMonitorNode
 
@@ -181,6 +186,22 @@ def test_a_range_sensor_counts_too(bench: Bench) -> None:
         )
         bench.run(0.1)
         assert driven.robot.commands[-1][0] == pytest.approx(want)
+
+
+def test_points_of_a_cloud_count_between_its_heights(bench: Bench) -> None:
+    stop = MonitorPolygon(name="Stop", action_type="stop", points=ZONE)
+    config = CollisionMonitorConfig(polygons=(stop,))
+    clouds = (MonitorCloud(topic="points", min_height=0.2, max_height=0.6),)
+    driven = Driven(bench, config, scan_topics=(), clouds=clouds)
+    cloud = bench.node.create_publisher(PointCloud2, "points", SENSOR_DATA)
+    driven.command = (0.1, 0.0)
+    for height, want in ((0.4, 0.0), (0.1, 0.1), (0.7, 0.1), (0.4, 0.0), (math.nan, 0.1)):
+        bar = np.column_stack([np.full(40, 0.3), np.linspace(-0.1, 0.1, 40), np.full(40, height)])
+        cloud.publish(create_cloud_xyz32(header(bench.clock.now_ns, "lidar"), bar))
+        bench.run(0.1)
+        assert driven.robot.commands[-1][0] == pytest.approx(want), f"{height} m"
+    bench.run(2.0)
+    assert driven.states[-1].polygon_name == "invalid source", "a camera that is silent"
 
 
 def test_it_can_be_switched_off(bench: Bench) -> None:

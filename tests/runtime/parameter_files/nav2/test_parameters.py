@@ -15,7 +15,9 @@ from tests.runtime.parameter_files.nav2.robot import applied
 from twin.controllers.limiter import AxisLimits
 from twin.errors import NavigationError, ScenarioError
 from twin.geometry import Pose2
+from twin.navigation.control.collision_monitor_config import MonitorCloud
 from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.navigation.costmaps.observation import ObservationSource
 from twin.navigation.docking.docks import Dock
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.runtime.defaults.navigation import NavigationParameters
@@ -373,7 +375,33 @@ def test_sources_of_a_costmap(tmp_path: Path) -> None:
         "Nav2 reads no such layer"
     )
     told = applied(tmp_path, f"local_costmap: {{local_costmap: {{ros__parameters: {{{layer}}}}}}}")[1]
-    assert told == ["nav2.yaml: local_costmap/local_costmap does not have layer.cloud.topic"]
+    assert told == []
+    (cloud,) = _costmap(tmp_path, layer).observation_sources
+    assert (cloud.topic, cloud.layer) == ("points", "obstacle_layer")
+
+
+def test_a_voxel_layer_with_its_clouds(tmp_path: Path) -> None:
+    layer = """plugins: [voxels], voxels: {plugin: 'nav2_costmap_2d::VoxelLayer', z_voxels: 8,
+        publish_voxel_map: true, max_obstacle_height: 1.2, observation_sources: scan camera,
+        scan: {topic: /scan, data_type: LaserScan},
+        camera: {topic: /camera/depth/points, clearing: true, min_obstacle_height: 0.1,
+                 max_obstacle_height: 1.8, obstacle_max_range: 3.5}}"""
+    got = _costmap(tmp_path, layer)
+    assert (got.layers.voxel_layer.z_voxels, got.layers.voxel_layer.publish_voxel_map) == (8, True)
+    assert got.scan_topics == ("scan",)
+    (camera,) = got.observation_sources
+    assert camera == ObservationSource(
+        topic="camera/depth/points",
+        clearing=True,
+        min_obstacle_height=0.1,
+        max_obstacle_height=1.2,
+        obstacle_max_range=3.5,
+    )
+    assert applied(tmp_path, f"local_costmap: {{local_costmap: {{ros__parameters: {{{layer}}}}}}}")[1] == []
+    assert not _costmap(tmp_path, layer.replace("z_voxels", "enabled: false, z_voxels")).observation_sources
+    assert _costmap(tmp_path, layer, {"observation_sources": []}).observation_sources == ()
+    with pytest.raises(NavigationError, match=r"min_obstacle_height is 1.5, more than max_obstacle_height"):
+        _costmap(tmp_path, layer.replace("min_obstacle_height: 0.1", "min_obstacle_height: 1.5"))
 
 
 @pytest.mark.parametrize("tolerance", [-1.0, -0.1, 0.0])
@@ -489,15 +517,16 @@ collision_monitor:
     observation_sources: [front, sonar, cloud]
     front: {type: scan, topic: /front/scan}
     sonar: {type: range, topic: /sonar}
-    cloud: {type: pointcloud, topic: /points}
+    cloud: {type: pointcloud, topic: /points, max_height: 1.2}
 """
     monitor = monitor_with_file(NavigationConfig(params_file=_file(tmp_path, text)), "")
     assert monitor.polygons is not None
     assert [polygon.name for polygon in monitor.polygons] == ["Stop"], "no footprint in place of Turning"
     assert (monitor.scan_topics, monitor.range_topics) == (("front/scan",), ("sonar",))
+    assert [cloud.config() for cloud in monitor.clouds] == [MonitorCloud(topic="points", max_height=1.2)]
     assert applied(tmp_path, text)[1] == [
         "nav2.yaml: collision_monitor does not have Stop.visualize, Turning.type, Turning.action_type, "
-        "Turning.velocity_polygons, cloud.type, cloud.topic"
+        "Turning.velocity_polygons"
     ]
     wrong = text.replace("Stop: {type", "Stop: {slowdown_ration: 0.4, type").replace("-0.4, 0.0]]", "-0.4]]")
     assert _said(tmp_path, wrong) == [

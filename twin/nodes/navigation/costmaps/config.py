@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from twin.navigation.costmaps.costmap_config import CostmapConfig
+from twin.navigation.costmaps.observation import ObservationSource
 from twin.parameters import Derived, Flat, Le, PeriodNs, Positive
 
 
@@ -21,6 +22,8 @@ class CostmapNodeConfig:
     """Of the grid and its layers."""
     scan_topics: tuple[str, ...] = ("scan",)
     """Topics of sensor_msgs/LaserScan for the obstacle layer: its `observation_sources`."""
+    observation_sources: tuple[ObservationSource, ...] = ()
+    """Of the voxel layer, and those of the obstacle layer beside `scan_topics`."""
     range_topics: tuple[str, ...] = ()
     """Topics of sensor_msgs/Range for the range sensor layer."""
     keepout_filter_info_topic: Annotated[str, Derived] = ""

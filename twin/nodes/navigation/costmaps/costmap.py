@@ -1,8 +1,9 @@
-"""A costmap fed from the map and the scans; planner and controller server own one each (nav2_costmap_2d)."""
+"""A costmap fed by map, scans and clouds; planner and controller server own one each (nav2_costmap_2d)."""
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from twin.bridge.msgs import (
     OccupancyGrid,
     PolygonStamped,
     Range,
+    VoxelGrid,
     header,
     ns,
 )
@@ -22,42 +24,24 @@ from twin.errors import MapError
 from twin.geometry import Array
 from twin.navigation.costmaps.costmap import Costmap
 from twin.navigation.costmaps.layered_costmap import LayeredCostmap
+from twin.navigation.costmaps.observation import Observation
 from twin.navigation.maps.occupancy_map import OCCUPIED
 from twin.navigation.odometry_watch import OdometryWatch
-from twin.navigation.warm_up import warm_up_costmap, warm_up_odometry_watch, warm_up_ranges
+from twin.navigation.warm_up import (
+    warm_up_costmap,
+    warm_up_odometry_watch,
+    warm_up_ranges,
+    warm_up_voxels,
+)
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.filters import KeepoutFilterPart, SpeedFilterPart
-from twin.nodes.navigation.costmaps.messages import polygon_msg
+from twin.nodes.navigation.costmaps.messages import polygon_msg, voxel_grid
+from twin.nodes.navigation.costmaps.observation_input import ObservationInput
 from twin.nodes.navigation.costmaps.publisher import CostmapPublisher
 from twin.nodes.navigation.costmaps.services import CostmapServices
 from twin.nodes.navigation.mapping.map_server import occupancy_map
 from twin.nodes.navigation.robot_pose import RobotPose
-from twin.nodes.navigation.scan_input import ScanInput
-
-
-def scan_points(message: LaserScan, no_return: float, *, inf_is_valid: bool = True) -> Array:
-    """Return the ends of a scan's rays in its frame, shape (n, 2).
-
-    Args:
-        message: The scan.
-        no_return: Where rays without return (inf, or beyond the sensor's range) end, so that they clear [m].
-        inf_is_valid: Whether they do; if not they are NaN, as those below the least range are.
-    """
-    ranges = message.ranges.astype(np.float64)
-    ranges[ranges > message.range_max] = no_return if inf_is_valid else np.nan
-    ranges[ranges < message.range_min] = np.nan
-    along, aside = _directions(message.angle_min, message.angle_increment, len(ranges))
-    points = np.empty((len(ranges), 2))
-    np.multiply(ranges, along, out=points[:, 0])
-    np.multiply(ranges, aside, out=points[:, 1])
-    return points
-
-
-@lru_cache(maxsize=64)
-def _directions(first: float, step: float, count: int) -> tuple[Array, Array]:
-    """Return x and y, shape (count,), of unit vectors along a lidar's rays, from their angles [rad]."""
-    angles = first + step * np.arange(count)
-    return np.cos(angles), np.sin(angles)
+from twin.nodes.navigation.scan_input import ScanInput, scan_points
 
 
 class _ScanSource:
@@ -92,17 +76,25 @@ class CostmapNode:
         self._scans = {topic: _ScanSource(robot_pose, node.now_ns) for topic in config.scan_topics}
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
-        own = f"{namespace}/{config.name}"
+        own, voxels = f"{namespace}/{config.name}", config.layers.voxel_layer.publish_voxel_map
         self._publisher = CostmapPublisher(
             node, own, config.frame, always_send_full=config.always_send_full_costmap
         )
         self._footprint_publisher = node.create_publisher(PolygonStamped, f"{own}/published_footprint", 1)
+        self._voxels = node.create_publisher(VoxelGrid, f"{own}/voxel_grid", LATCHED) if voxels else None
         self._known = np.zeros((0, 2))
         on_map = self._on_known_map if config.layers.rolling_window else self._on_map
         node.create_subscription(OccupancyGrid, f"{namespace}/map", on_map, LATCHED)
         for topic, source in self._scans.items():
             on_scan = robot_pose.placed(partial(self._on_scan, source))
             node.create_subscription(LaserScan, f"{namespace}/{topic}", on_scan, SENSOR_DATA, frozen=True)
+        self._clouds = [
+            ObservationInput(node, robot_pose, source, config.frame, f"{namespace}/{source.topic}")
+            for source in config.observation_sources
+            if source.layer != "voxel_layer" or config.layers.voxel_layer.enabled
+        ]
+        if self._clouds:
+            warm_up_voxels()
         for topic in config.range_topics:
             node.create_subscription(
                 Range, f"{namespace}/{topic}", self._ranges.append, SENSOR_DATA, frozen=True
@@ -137,9 +129,9 @@ class CostmapNode:
     def fault(self) -> str:
         """Why the costmap is not current, so that nobody should drive by it; empty if it is."""
         tolerance_ns = round(self.config.layers.expected_update_rate * 1e9)
-        if not tolerance_ns:
-            return self._contradiction
-        faults = (source.watch.fault(self.node.now_ns, tolerance_ns) for source in self._scans.values())
+        faults = [cloud.fault(self.node.now_ns) for cloud in self._clouds]
+        if tolerance_ns:
+            faults += [source.watch.fault(self.node.now_ns, tolerance_ns) for source in self._scans.values()]
         return next(filter(None, faults), "") or self._contradiction
 
     @property
@@ -186,6 +178,7 @@ class CostmapNode:
             scan = source.fresh or source.last
             if scan is not None and self.node.now_ns - ns(scan.header.stamp) <= self.config.update_period_ns:
                 self._take_scan(layers, scan)
+        self._observe(layers, [cloud.latest(self.config.update_period_ns) for cloud in self._clouds])
 
     def _on_scan(self, source: _ScanSource, message: LaserScan) -> None:
         if not source.watch.accept(message, self.node.now_ns):
@@ -221,6 +214,7 @@ class CostmapNode:
             if source.fresh is not None:
                 source.last, source.fresh = source.fresh, None
                 self._take_scan(layers, source.last)
+        self._observe(layers, [cloud.due() for cloud in self._clouds])
         for message in ranges:
             self._take_range(layers, message)
         layers.update_layers(robot, self.node.now_ns)
@@ -242,6 +236,12 @@ class CostmapNode:
         robot = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
         layers.update(points, (T_frame_lidar.x, T_frame_lidar.y), robot)
 
+    def _observe(self, layers: LayeredCostmap, seen: Sequence[Sequence[Observation]]) -> None:
+        """Take what clouds show; all at once, for no ray shall clear what another sensor sees."""
+        if observations := [one for of_source in seen for one in of_source]:
+            robot = self._robot_pose.relative(self.config.frame, self._robot_pose.frames.base)
+            layers.observe(observations, robot)
+
     def _take_range(self, layers: LayeredCostmap, message: Range) -> None:
         sensor = self._robot_pose.at_stamp(self.config.frame, message.header)
         if sensor is not None:
@@ -252,6 +252,9 @@ class CostmapNode:
         grid = self.costmap
         if grid is not None:
             self._publisher.publish(grid, self.node.now_ns)
+        if self._voxels is not None and self._layers is not None and self._layers.columns is not None:
+            levels, now = self.config.layers.voxel_layer, header(self.node.now_ns, self.config.frame)
+            self._voxels.publish(voxel_grid(self._layers.costmap, self._layers.columns, levels, now))
         if contradiction := self._contradiction:
             name = f"{self.node.fully_qualified_name}: odometry"
             error = DiagnosticStatus(

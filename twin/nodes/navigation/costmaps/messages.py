@@ -11,11 +11,14 @@ from twin.bridge.msgs import Costmap as CostmapMessage
 from twin.bridge.msgs import (
     CostmapMetaData,
     CostmapUpdate,
+    Header,
     OccupancyGrid,
     OccupancyGridUpdate,
     Point32,
     Polygon,
     PolygonStamped,
+    Vector3,
+    VoxelGrid,
     header,
     stamp,
 )
@@ -27,6 +30,8 @@ from twin.navigation.costmaps.costmap import (
     NO_INFORMATION,
     Costmap,
 )
+from twin.navigation.costmaps.costmap_config import VoxelConfig
+from twin.navigation.costmaps.voxel_layer import Columns
 from twin.navigation.costmaps.window import Window
 from twin.nodes.navigation.mapping.map_server import grid_msg
 
@@ -87,3 +92,17 @@ def polygon_msg(corners: Array, frame: str, time_ns: int) -> PolygonStamped:
     """Return corners, shape (n, 2) [m], as a polygon in a frame."""
     points = [Point32(x, y, 0.0) for x, y in corners.tolist()]
     return PolygonStamped(header=header(time_ns, frame), polygon=Polygon(points=points))
+
+
+def voxel_grid(grid: Costmap, columns: Columns, levels: VoxelConfig, placed: Header) -> VoxelGrid:
+    """Return the columns of a costmap's voxel layer, shape (height, width), as `voxel_grid` shows them."""
+    height, width = columns.shape
+    return VoxelGrid(
+        header=placed,
+        data=columns.reshape(-1).copy(),
+        origin=Point32(x=grid.origin[0], y=grid.origin[1], z=levels.origin_z),
+        resolutions=Vector3(x=grid.resolution, y=grid.resolution, z=levels.z_resolution),
+        size_x=width,
+        size_y=height,
+        size_z=levels.z_voxels,
+    )

@@ -13,9 +13,8 @@ from twin.navigation.docking.config import DockEstimateConfig
 from twin.navigation.docking.dock_estimate import DockEstimate
 from twin.navigation.docking.docks import DockType
 from twin.navigation.warm_up import warm_up_docking
-from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
-from twin.nodes.navigation.scan_input import ScanInput
+from twin.nodes.navigation.scan_input import ScanInput, scan_points
 
 
 class DockDetection:

@@ -5,23 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
-from twin.bridge.msgs import CollisionMonitorState, Header, LaserScan, Range, Twist, new, ns
+from twin.bridge.msgs import CollisionMonitorState, Header, LaserScan, PointCloud2, Range, Twist, new, ns
+from twin.bridge.point_cloud2 import read_points
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import Toggle
+from twin.clouds.points import XYZ, coordinates
 from twin.controllers.velocity_smoother import VelocitySmoother, VelocitySmootherConfig
+from twin.errors import BridgeError, CloudError
 from twin.geometry import Array, Pose2
 from twin.navigation.control.collision_monitor import INVALID_SOURCE, Action, CollisionMonitor
-from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig
+from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig, MonitorCloud
 from twin.navigation.warm_up import warm_up_collision_monitor
-from twin.nodes.navigation.costmaps.costmap import scan_points
 from twin.nodes.navigation.robot_pose import RobotPose
-from twin.nodes.navigation.scan_input import ScanInput
+from twin.nodes.navigation.scan_input import ScanInput, scan_points
 from twin.nodes.node_parameters import declare_config
 
 _ACTIONS = {None: 0, "stop": 1, "slowdown": 2, "approach": 3, "limit": 4}
@@ -29,6 +32,8 @@ _FIRST_PERIOD_S = 0.02
 """After a pause in the commands, in which the drive came to rest."""
 _REACTION_S = 0.1
 """From a scan to wheels that brake."""
+_SQUARE = 0.02
+"""Of a cloud one point is kept for so much of the floor [m]."""
 _RANGE_STEP = np.radians(1.0)
 
 
@@ -59,6 +64,7 @@ class CollisionMonitorNode:
         cmd_vel_out: str = "cmd_vel",
         scan_topics: tuple[str, ...] = ("scan",),
         range_topics: tuple[str, ...] = (),
+        clouds: tuple[MonitorCloud, ...] = (),
         namespace: str = "",
     ) -> None:
         self.node = node = bus.create_node("collision_monitor", namespace)
@@ -68,7 +74,9 @@ class CollisionMonitorNode:
         self._robot_pose = robot_pose
         self._enabled = True
         self._polygon = ""
-        self._readings: dict[str, _Reading | None] = dict.fromkeys((*scan_topics, *range_topics))
+        self._readings: dict[str, _Reading | None] = dict.fromkeys(
+            (*scan_topics, *range_topics, *(cloud.topic for cloud in clouds))
+        )
         self._brakes = VelocitySmoother(brakes) if brakes else None
         # How many times harder the drive can brake than it does when nothing is wrong.
         self._hardest = hardest
@@ -83,6 +91,9 @@ class CollisionMonitorNode:
             node.create_subscription(
                 Range, topic, robot_pose.placed(self._keep(topic)), SENSOR_DATA, frozen=True
             )
+        for cloud in clouds:
+            on_cloud = robot_pose.placed(partial(self._keep_cloud, cloud))
+            node.create_subscription(PointCloud2, cloud.topic, on_cloud, SENSOR_DATA, frozen=True)
         node.create_subscription(Twist, cmd_vel_in, self._on_twist, 10, frozen=True)
         node.create_service(Toggle, "collision_monitor/toggle", self._on_toggle)
 
@@ -108,6 +119,20 @@ class CollisionMonitorNode:
             self._readings[topic] = _Reading(message.header, points.compress(there, axis=0))
 
         return on_message
+
+    def _keep_cloud(self, cloud: MonitorCloud, message: PointCloud2) -> None:
+        base = self._robot_pose.frames.base
+        T_base_sensor = self._robot_pose.place_at_stamp(base, message.header)
+        if T_base_sensor is None:
+            return
+        try:
+            points = T_base_sensor.apply(coordinates(read_points(message, XYZ)))
+        except (BridgeError, CloudError):
+            return  # what cannot be read is as good as silent
+        there = (points[:, 2] >= cloud.min_height) & (points[:, 2] <= cloud.max_height)  # NaN is not there
+        self._readings[cloud.topic] = _Reading(
+            Header(stamp=message.header.stamp, frame_id=base), _thinned(points[there, :2])
+        )
 
     def _on_twist(self, message: Twist) -> None:
         velocity = (message.linear.x, message.angular.z)
@@ -167,6 +192,14 @@ class CollisionMonitorNode:
         if reading.T_odom_sensor is None:
             reading.T_odom_sensor = self._robot_pose.at_stamp(self._robot_pose.frames.odom, reading.header)
         return reading.T_odom_sensor
+
+
+def _thinned(points: Array) -> Array:
+    """Return one point, shape (n, 2), for each square of 2 cm: a picture has more than can be tracked."""
+    near = points[np.isfinite(points).all(axis=1)]
+    _, first = np.unique(np.floor(near / _SQUARE).astype(np.int64), axis=0, return_index=True)
+    thinned: Array = near[first]
+    return thinned
 
 
 def _arc(message: Range) -> Array:

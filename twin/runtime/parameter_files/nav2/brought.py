@@ -15,7 +15,7 @@ from twin.runtime.parameter_files.nav2.names import is_users
 from twin.scenario.plugin_groups import config_of_use
 from twin.scenario.plugins import PluginUse
 
-_LAYERS = {"StaticLayer": "static_layer", "ObstacleLayer": "obstacle_layer", "VoxelLayer": "obstacle_layer"}
+_LAYERS = {"StaticLayer": "static_layer", "ObstacleLayer": "obstacle_layer", "VoxelLayer": "voxel_layer"}
 _LAYERS |= {"RangeSensorLayer": "range_sensor_layer", "InflationLayer": "inflation_layer"}
 """Classes of Nav2's layers -> what they are here."""
 

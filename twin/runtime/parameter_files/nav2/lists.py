@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from twin.geometry import Pose2
+from twin.navigation.costmaps.observation import ObservationSource
 from twin.navigation.docking.docks import Dock, DockDatabase, DockType
+from twin.parameters.declaration import fields_of
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.names import class_of
 
@@ -61,6 +64,52 @@ def sources_of(file: Nav2Parameters, node: str) -> tuple[tuple[str, ...], tuple[
             file.understood(node, name)
             ranges += [file.relative(str(topic)) for topic in value]
     return tuple(scans), tuple(ranges)
+
+
+def clouds_of(file: Nav2Parameters, node: str) -> tuple[ObservationSource, ...]:
+    """Return the point clouds that a costmap's layers take. Faults are noted in `file`.
+
+    Nav2's laser scans of a voxel layer are among `sources_of`: here the obstacle layer takes them, beside it.
+    """
+    values, found = file.values(node), list[ObservationSource]()
+    for name, listed in values.items():
+        layer, _, last = name.rpartition(".")
+        is_used = values.get(f"{layer}.enabled") is not False and layer in values.get("plugins", layer)
+        if last != "observation_sources" or not is_used:
+            continue
+        for source in listed.split() if isinstance(listed, str) else listed:
+            if values.get(f"{layer}.{source}.data_type", "PointCloud2") == "PointCloud2":
+                file.understood(node, name)
+                found += _cloud(file, node, layer, source)
+    return tuple(found)
+
+
+def _cloud(file: Nav2Parameters, node: str, layer: str, source: str) -> list[ObservationSource]:
+    """Return a source of clouds; [] if it cannot be one."""
+    values, section = file.values(node), f"{layer}.{source}."
+    is_voxel = class_of(values.get(f"{layer}.plugin", layer)).casefold() in ("voxellayer", "voxel_layer")
+    taken: dict[str, Any] = {"layer": "voxel_layer" if is_voxel else "obstacle_layer"}
+    for one in fields_of(ObservationSource).values():
+        name = section + one.name
+        if one.name == "layer" or one.domain is None or name not in values:
+            continue
+        file.understood(node, name)
+        try:
+            taken[one.field] = one.read(values[name])
+        except ValueError as error:
+            file.wrong(node, name, str(error))
+            return []
+    taken["topic"] = file.relative(str(taken.get("topic", source)))
+    for bound, of_both in (("min", max), ("max", min)):  # the layer has limits, too
+        name = f"{bound}_obstacle_height"
+        if isinstance(own := values.get(f"{layer}.{name}"), int | float):
+            file.understood(node, f"{layer}.{name}")
+            taken[name] = of_both(float(own), taken.get(name, float(own)))
+    try:
+        return [ObservationSource(**taken)]
+    except ValueError as error:
+        file.wrong(node, f"{layer}.{source}", str(error))
+        return []
 
 
 def _lasers(file: Nav2Parameters, node: str, layer: str, sources: Sequence[str]) -> list[str]:

@@ -6,11 +6,19 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from twin.navigation.control.collision_monitor_config import CollisionMonitorConfig, MonitorPolygon
+from twin.navigation.control.collision_monitor_config import (
+    CollisionMonitorConfig,
+    MonitorCloud,
+    MonitorPolygon,
+)
 from twin.parameters.declaration import fields_of, names_of
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
 from twin.runtime.parameter_files.nav2.names import corners_of
-from twin.scenario.collision_monitor import CollisionMonitorParameters, MonitorPolygonParameters
+from twin.scenario.collision_monitor import (
+    CollisionMonitorParameters,
+    MonitorCloudParameters,
+    MonitorPolygonParameters,
+)
 
 _NODE = "collision_monitor"
 _CIRCLE_CORNERS = 16
@@ -18,7 +26,7 @@ _NAMES = names_of(CollisionMonitorConfig)
 _SERVER = (_NAMES.polygons, "observation_sources", _NAMES.source_timeout_ns)
 _POLYGON = (*MonitorPolygonParameters.model_fields, "type", "radius", "max_points")
 _SENSOR = ("type", "topic", "enabled")
-_SENSORS = ("scan", "range")
+_SENSORS = ("scan", "range", "pointcloud")
 """Types of sources that are here."""
 
 
@@ -41,6 +49,7 @@ def monitor_of(file: Nav2Parameters) -> CollisionMonitorParameters | None:
         polygons=polygons if fitting or not active else None,
         scan_topics=_topics(file, values, "scan") or None,
         range_topics=_topics(file, values, "range"),
+        clouds=tuple(_clouds(file, values)),
     )
 
 
@@ -74,6 +83,8 @@ def _read(values: Mapping[str, Any]) -> Iterator[str]:
     for name in sensors:
         if values.get(f"{name}.type", "scan") in _SENSORS:
             yield from (f"{name}.{key}" for key in _SENSOR)
+        if values.get(f"{name}.type") == "pointcloud":
+            yield from (f"{name}.{key}" for key in ("min_height", "max_height"))
 
 
 def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tuple[str, ...]:
@@ -82,6 +93,20 @@ def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tupl
         for name in values.get("observation_sources") or ()
         if values.get(f"{name}.type", "scan") == type_ and values.get(f"{name}.enabled", True)
     )
+
+
+def _clouds(file: Nav2Parameters, values: Mapping[str, Any]) -> Iterator[MonitorCloudParameters]:
+    for name in values.get("observation_sources") or ():
+        if values.get(f"{name}.type") != "pointcloud" or not values.get(f"{name}.enabled", True):
+            continue
+        inside = {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
+        given = _taken(MonitorCloud, f"{name}.", {"topic": "scan", **inside}, file)
+        if given is None:
+            continue
+        try:
+            yield MonitorCloudParameters.model_validate(given | {"topic": file.relative(given["topic"])})
+        except ValueError:
+            file.wrong(_NODE, name, "has a min_height above its max_height")
 
 
 def _polygon(name: str, file: Nav2Parameters, values: Mapping[str, Any]) -> MonitorPolygonParameters | None:

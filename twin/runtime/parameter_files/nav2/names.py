@@ -26,8 +26,10 @@ LISTS = ("plugins", "plugin", "docks")
 _DOCKS = ("SimpleChargingDock", "SimpleNonChargingDock")
 _LAYERS = ("static_layer", "obstacle_layer", "voxel_layer", "inflation_layer", "stvl_layer", "range_layer")
 """Sections of layers whose plugin the file does not tell."""
-_OWN_SECTIONS = ("range_sensor_layer.", "keepout_filter.")
+_OWN_SECTIONS = ("range_sensor_layer.", "voxel_layer.", "keepout_filter.")
 """Of a costmap here; all other layers share one set of parameters."""
+_SECTION_OF = {"RangeSensorLayer": "range_sensor_layer.", "VoxelLayer": "voxel_layer."}
+"""Nav2's classes of layers -> their own section here."""
 _BEHAVIORS = ("spin", "backup", "drive_on_heading", "assisted_teleop", "wait")
 _SECTIONS = {
     "controller_plugins": "FollowPath",
@@ -149,9 +151,11 @@ def flat(values: dict[str, Value], known: tuple[str, ...]) -> dict[str, Value]:
         section, last = name.partition(".")[0], name.rpartition(".")[2]
         if section not in sections or name in known:
             return name
-        is_range = sections[section] == "RangeSensorLayer" or section == "range_layer"
-        own = [other for other in known if other.startswith(_OWN_SECTIONS[0] if is_range else _OWN_SECTIONS)]
-        fitting = own if is_range else [other for other in known if other not in own]
+        own = {"range_layer": "range_sensor_layer.", "voxel_layer": "voxel_layer."}.get(section)
+        own = _SECTION_OF.get(sections[section], own)
+        fitting = [other for other in known if own is not None and other.startswith(own)]
+        if own != "range_sensor_layer.":  # what a voxel layer shares with an obstacle layer is here once
+            fitting += [other for other in known if not other.startswith(_OWN_SECTIONS)]
         return next((other for other in fitting if other.rpartition(".")[2] == last), name)
 
     return {here(name): entry for name, entry in values.items()}

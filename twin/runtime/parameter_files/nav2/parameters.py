@@ -19,7 +19,7 @@ from twin.plugins import Kind
 from twin.runtime.defaults.navigation import NavigationParameters, with_scenario
 from twin.runtime.parameter_files.nav2.brought import brought, with_critics, with_layers, with_smoothers
 from twin.runtime.parameter_files.nav2.file import Nav2Parameters
-from twin.runtime.parameter_files.nav2.lists import database_of, sources_of
+from twin.runtime.parameter_files.nav2.lists import clouds_of, database_of, sources_of
 from twin.runtime.parameter_files.nav2.monitor import monitor_of
 from twin.runtime.parameter_files.nav2.names import PLANNERS
 from twin.runtime.parameter_files.nav2.trees import with_trees
@@ -183,7 +183,9 @@ def _limits(config: NavigationConfig) -> frozenset[str]:
 
 def _costmap(file: Nav2Parameters, config: CostmapNodeConfig, group: CostmapParameters) -> CostmapNodeConfig:
     node = f"{config.name}/{config.name}"
-    scans, ranges = sources_of(file, node)
+    (scans, ranges), clouds = sources_of(file, node), clouds_of(file, node)
+    if group.observation_sources is None and clouds:
+        config = replace(config, observation_sources=clouds)
     config = replace(
         config,
         scan_topics=config.scan_topics if group.scan_topics is not None else scans or config.scan_topics,
