@@ -225,14 +225,17 @@ def test_voxels_roll_with_the_window_and_are_forgotten_with_it() -> None:
     costmap.observe([seen_from(EYE, [TOP, (-1.48, 0.02, 0.5)])])
     costmap.move_to(1.0, 0.0)
     assert cost(costmap) == LETHAL_OBSTACLE
+    assert costmap.columns is not None
+    ((column, row, level),) = marked_voxels(costmap.columns, 16)
+    assert (column, row) == costmap.costmap.world_to_cell(*TOP[:2]), "the column is where its cell is"
+    assert level == 5
     costmap.move_to(0.0, 0.0)
     assert (cost(costmap), cost(costmap, (-1.48, 0.02))) == (LETHAL_OBSTACLE, FREE_SPACE)
     costmap.observe([seen_from(EYE, (1.8, 0.036, 0.6))])
-    assert cost(costmap) == FREE_SPACE, "the column is where its cell is"
+    assert cost(costmap) == FREE_SPACE
     costmap.observe([seen_from(EYE, TOP)])
     costmap.clear_area(-1.0, 0.0, 1.0, outside=True)
     assert cost(costmap) == FREE_SPACE
-    assert costmap.columns is not None
     assert not len(marked_voxels(costmap.columns, 16))
     assert (costmap.columns[:, -10:] == UNKNOWN_COLUMN).all()
 

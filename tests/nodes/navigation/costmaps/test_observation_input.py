@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tests.nodes.conftest import TICK_NS, Bench, Robot, open_room
-from twin.bridge.msgs import LaserScan, PointCloud2, PointField, VoxelGrid, header
+from twin.bridge.msgs import LaserScan, PointCloud2, PointField, VoxelGrid, header, new
 from twin.bridge.point_cloud2 import create_cloud, create_cloud_xyz32
 from twin.bridge.qos import LATCHED, SENSOR_DATA
+from twin.bridge.srvs import ClearEntireCostmap
 from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
 from twin.geometry import Pose3, quat_wxyz_from_rpy
 from twin.navigation.costmaps.costmap_config import CostmapConfig, VoxelConfig
@@ -116,6 +117,18 @@ def test_what_persists_is_marked_again(bench: Bench) -> None:
     bench.run(1.5)
     looking.show((0.42, -0.5, 2.0))
     assert looking.cost(1.2, -0.21) == 0
+
+
+def test_what_was_cleared_by_a_service_comes_back_with_the_next_picture_only(bench: Bench) -> None:
+    looking = Looking(bench)
+    looking.show((0.21, -0.25, 1.0))
+    bench.run(0.5)
+    service = "local_costmap/clear_entirely_local_costmap"
+    bench.call(ClearEntireCostmap, service, new(ClearEntireCostmap.Request))
+    bench.run(0.5)
+    assert looking.cost(1.2, -0.21) == 0
+    looking.show((0.21, -0.25, 1.0))
+    assert looking.cost(1.2, -0.21) == 254
 
 
 def test_nobody_drives_by_a_camera_that_is_silent(bench: Bench) -> None:
