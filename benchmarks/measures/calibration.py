@@ -2,6 +2,7 @@
 
 `python -m benchmarks.measures.calibration 100` drives a robot with wheels, track and latency that its model
 does not know through a small room, as many times, each time with other commands and noise, in one process.
+A second number is the first seed, 1 if there is none.
 """
 
 from __future__ import annotations
@@ -167,17 +168,18 @@ def planted(truth: Truth) -> dict[str, float]:
     }
 
 
-def main(count: int, seconds: float = 45.0) -> None:
+def main(count: int = 100, first: int = 1, seconds: float = 45.0) -> None:
     """Print the table."""
     found: list[tuple[dict[str, float], Calibration]] = []
     began = time.process_time()
     with TemporaryDirectory() as name:
         folder = Path(name)
         scenario = room(folder)
-        for seed in range(1, count + 1):
+        for seed in range(first, first + count):
             bag = folder / f"bag_{seed}"
             found.append((planted(record(scenario, bag, seed, seconds)), calibrate(scenario, bag)))
-    print(f"{count} bags of {seconds:g} s, {PLANTED}: {time.process_time() - began:.0f} s of CPU")
+    bags, spent = f"{count} bags of {seconds:g} s from seed {first} on", time.process_time() - began
+    print(f"{bags}, {PLANTED}: {spent:.0f} s of CPU")
     print(f"{'':20}{'covered':>8}{'largest error':>16}{'widest interval':>18}")
     for key in found[0][0]:
         estimates = [next(e for e in each.estimates if e.name == key) for _, each in found]
@@ -194,4 +196,4 @@ def main(count: int, seconds: float = 45.0) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    main(*map(int, sys.argv[1:]))

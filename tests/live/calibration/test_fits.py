@@ -71,6 +71,21 @@ def test_wheels_that_slide_make_intervals_wide() -> None:
     assert loose.covariance[2, 2] > 4.0 * still.covariance[2, 2]
 
 
+def test_intervals_of_short_drives_count_with_slip_too_small_to_be_seen() -> None:
+    turned, errors = wheels(8.0), []
+    for seed in range(100, 108):
+        rng = np.random.default_rng(seed)
+        increments, poses, covariances = scan_poses(turned, TRUE, rng)
+        steps = compose(inverse(poses[:-1]), poses[1:])
+        steps += rng.normal(size=steps.shape) * [2e-4, 0.0, 2e-4]
+        slid = [poses[0]]
+        for step in steps:
+            slid.append(compose(slid[-1], step))
+        fit = fit_drive(increments, np.array(slid), covariances, BELIEVED, TRACK)
+        errors.append((fit.values - TRUE) / np.sqrt(np.diag(fit.covariance)))
+    assert np.count_nonzero(np.abs(errors) < 1.96) >= 61  # of 72
+
+
 def test_increments_of_few_scans_are_refused() -> None:
     increments, poses, covariances = scan_poses(wheels(4.0), TRUE, np.random.default_rng(4))
     with pytest.raises(ValueError, match="at least 20"):
