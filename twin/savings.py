@@ -44,3 +44,20 @@ def uncollected() -> Iterator[None]:
             gc.freeze()
             gc.unfreeze()  # all that is there is old now: the next look need not go through it
             gc.enable()
+
+
+_SELDOM = 20_000
+"""Objects that are made and stay before garbage is looked for; ticks leave few, and hardly a circle."""
+
+
+@contextmanager
+def seldom_collected() -> Iterator[None]:
+    """Look for garbage seldom in the block, and only among what it makes: what is there by now stays."""
+    often, *older = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(max(often, _SELDOM) if often else 0, *older)  # 0: not at all
+    try:
+        yield
+    finally:
+        gc.set_threshold(often, *older)
+        gc.unfreeze()

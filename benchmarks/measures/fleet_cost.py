@@ -8,7 +8,6 @@ is shared, so the cost of a robot should fall with their number.
 from __future__ import annotations
 
 import argparse
-import gc
 import math
 import tempfile
 import time
@@ -21,6 +20,7 @@ import numpy as np
 from benchmarks.measures.fleet import fleet
 from benchmarks.measures.run_cost import advance
 from twin.runtime.open_run import OpenRun
+from twin.savings import seldom_collected
 from twin.scenario.verdict import Verdict
 
 BLOCK_S = 1.0
@@ -37,8 +37,7 @@ def round_of(folder: Path, robots: Sequence[int], blocks: int, seconds: float) -
             runs[n] = OpenRun(fleet(folder, n, blocks=blocks, duration=WARM_UP_S + seconds), record=False)
             ending.callback(runs[n].close)
             advance(runs[n], WARM_UP_S)
-        gc.freeze()  # as a run does
-        ending.callback(gc.unfreeze)
+        ending.enter_context(seldom_collected())  # as a run does
         for block in range(math.ceil(seconds / BLOCK_S)):
             for n, run in runs.items():
                 began = time.process_time()

@@ -9,7 +9,6 @@ by layer.
 from __future__ import annotations
 
 import argparse
-import gc
 import math
 import tempfile
 import time
@@ -23,6 +22,7 @@ import numpy as np
 from benchmarks.measures.layers import Layers, picture
 from benchmarks.measures.replay import Replay
 from twin.runtime.open_run import OpenRun
+from twin.savings import seldom_collected
 from twin.scenario.schema import Scenario, load
 
 BLOCK_S = 2.0
@@ -57,8 +57,7 @@ def costs(scenario: Scenario, limit: Replay, *, record: bool) -> dict[str, list[
             run = OpenRun(scenario, out=Path(folder), record=name == "recorded")
             ending.callback(run.close)
             turns[name] = partial(advance, run)
-        gc.freeze()  # as a run does
-        ending.callback(gc.unfreeze)
+        ending.enter_context(seldom_collected())  # as a run does
         taken: dict[str, list[float]] = {name: [] for name in turns}
         for block in range(1, math.ceil(limit.simulated_s / BLOCK_S) + 1):
             for name, until in turns.items():

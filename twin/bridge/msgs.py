@@ -179,7 +179,7 @@ def stamp(time_ns: int) -> Time:
     """Return a time [ns] as a message.
 
     >>> stamp(1_500_000_000)
-    builtin_interfaces__msg__Time(sec=1, nanosec=500000000, __msgtype__='builtin_interfaces/msg/Time')
+    builtin_interfaces__msg__Time(sec=1, nanosec=500000000)
     """
     return Time(time_ns // _NS, time_ns % _NS)
 

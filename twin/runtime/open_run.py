@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 import uuid
 import weakref
@@ -30,7 +29,7 @@ from twin.runtime.run import Run
 from twin.runtime.stacks.context import WHOLE, Layout
 from twin.runtime.stacks.robot import RobotStack
 from twin.runtime.threads import end_threads
-from twin.savings import ALL, Savings, uncollected
+from twin.savings import ALL, Savings, seldom_collected, uncollected
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import Provenance, cpu_class, versions
 from twin.scenario.schema import Scenario
@@ -283,11 +282,8 @@ class OpenRun:
     ) -> None:
         """Tick until the run is over, or `watch` returns True; see `advance`."""
         run = self.run
-        gc.freeze()  # the model and the types stay; collections look only at what ticks make
-        try:
+        with seldom_collected():  # the model and the types stay
             self.advance(None if watch is None else lambda: watch(run), progress)
-        finally:
-            gc.unfreeze()
 
     def show(self, topic: str, message: Any) -> None:
         """Draw a message that no node has published, if there is a recording."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys import store as rosbags_store
 
 from twin.bridge import types
 from twin.bridge.actions.server import ActionServer
@@ -18,11 +17,11 @@ from twin.bridge.bus import Bus
 from twin.bridge.cdr.decoder import decoder
 from twin.bridge.cdr.encoder import encoder
 from twin.bridge.msgs import Time
-from twin.bridge.types import ActionType, ServiceType
+from twin.bridge.types import ActionType, ServiceType, lazy_store
 from twin.errors import BridgeError
 
 
-def test_its_classes_are_those_of_rosbags() -> None:
+def test_its_classes_have_the_fields_and_constants_of_those_of_rosbags() -> None:
     types.register("test_msgs/msg/Lazy", "int32 FEW=3\nfloat64[] values\nstring from\nTime stamp\n")
     types.register("test_msgs/msg/Time", "int32 t")
     made = types.get("test_msgs/msg/Lazy")
@@ -30,10 +29,17 @@ def test_its_classes_are_those_of_rosbags() -> None:
     eager.register({"test_msgs/msg/Lazy": types.definitions("test_msgs/msg/Lazy")["test_msgs/msg/Lazy"]})
     other = eager.types["test_msgs/msg/Lazy"]
     assert made is types.get("test_msgs/msg/Lazy")
-    arguments = (np.zeros(2), "here", Time(1, 2))
-    assert repr(made(*arguments)) == repr(other(*arguments))
-    assert (made.FEW, made.__annotations__) == (3, other.__annotations__)
-    assert copy.deepcopy(made(None, "a", None)) == made(None, "a", None)
+    assert (made.__name__, made.__msgtype__, made.FEW) == (other.__name__, other.__msgtype__, other.FEW)
+    values, stamp = np.zeros(2), Time(1, 2)
+    message, its = made(values, "here", stamp=stamp), other(values, "here", stamp=stamp)
+    assert (message.values, message.from_, message.stamp) == (its.values, its.from_, its.stamp)
+    assert repr(made(1, "a", 2)) == "test_msgs__msg__Lazy(values=1, from_='a', stamp=2)"
+    assert copy.deepcopy(made(None, "a", None)) == made(None, "a", None) != made(None, "b", None)
+
+
+def test_a_field_that_a_message_does_not_have_cannot_be_set() -> None:
+    with pytest.raises(AttributeError, match="nsec"):
+        Time(1, 2).nsec = 3  # type: ignore[attr-defined]
 
 
 def test_fields_that_python_cannot_tell_apart_are_an_error_of_the_user() -> None:
@@ -46,13 +52,13 @@ def test_fields_that_python_cannot_tell_apart_are_an_error_of_the_user() -> None
 def made(monkeypatch: pytest.MonkeyPatch) -> Callable[[], Counter[str]]:
     """Return a function that tells what was generated since it was last asked."""
     found = Counter[str]()
-    generate = rosbags_store.generate_python_code
+    make = lazy_store.make_dataclass
 
-    def generated(*arguments: Any) -> str:
+    def making(*arguments: Any, **options: Any) -> type:
         found["class"] += 1
-        return generate(*arguments)
+        return make(*arguments, **options)
 
-    monkeypatch.setattr(rosbags_store, "generate_python_code", generated)
+    monkeypatch.setattr(lazy_store, "make_dataclass", making)
 
     def tell() -> Counter[str]:
         now = found + Counter(encoder=encoder.cache_info().misses, decoder=decoder.cache_info().misses)
