@@ -43,8 +43,6 @@ class Beside(Source):
         self._nodes: dict[int, Node] = {}
         """Of the cable's end at each plant."""
         self._publishers: dict[tuple[int, str], Publisher[Any]] = {}
-        self._only: dict[int, tuple[str, ...]] = {}
-        """Which robots of a plant are there; empty: all."""
         self._queue: list[tuple[int, int, Callable[[], None]]] = []
         self._count = 0
 
@@ -81,13 +79,12 @@ class Beside(Source):
         self._clock.follow(START_NS + now_ns, 0)
         changes: list[ClockChange] = []
         for robots in self.plants:
-            for name in self._only[id(robots)] or robots.names:
+            for name in robots.names:
                 changes += self._clocks.follow(name, now_ns, robots.clock.now_ns, round(BOUND_S * 1e9))
         return changes
 
-    def start(self, robots: Plant, only: Sequence[str] = ()) -> None:
-        """Connect robots, from now on; of several only some are heard, if they are named."""
-        self._only[id(robots)] = tuple(only)
+    def start(self, robots: Plant) -> None:
+        """Connect robots, from now on."""
         bus = robots.run.run.bus
         self.plants.append(robots)
         self._nodes[id(robots)] = bus.create_node("cable")
@@ -108,9 +105,6 @@ class Beside(Source):
 
     def _up(self, robots: Plant, sample: Sample[Any]) -> None:
         if sample.publisher.node is self._nodes[id(robots)] or sample.topic in _NOT_CARRIED:
-            return
-        only = self._only[id(robots)]
-        if only and sample.topic.split("/")[1] not in only:
             return
         self._carry(self._node, id(robots), sample, self._comes_in)
 

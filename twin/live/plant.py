@@ -35,6 +35,7 @@ class Plant:
         *,
         error: ClockError = RIGHT,
         network: SessionConfig,
+        is_one_of_several: bool = False,
         autonomy: bool = False,
         truth: Path | None = None,
         bag: Path | None = None,
@@ -47,6 +48,7 @@ class Plant:
             scenario: Its robots, world and faults; also its missions, with `autonomy`.
             error: How wrong their clock is.
             network: Where others reach them.
+            is_one_of_several: Whether other robots, elsewhere, share the graph: names are behind the robot's.
             autonomy: Whether localisation, navigation and missions run on the robots, too.
             truth: A CSV file for where they really are, each tick; nobody but a test may look.
             bag: Folder for a bag of what the robots say and hear.
@@ -77,7 +79,7 @@ class Plant:
                 bag=bag,
                 clock=self.clock,
                 endless=True,
-                layout=Layout(autonomy="all" if autonomy else "none"),
+                layout=Layout(autonomy="all" if autonomy else "none", is_one_of_several=is_one_of_several),
             )
             ending.callback(self.run.close)
             self._ending = ending.pop_all()

@@ -164,7 +164,7 @@ def build(
                     control_period_ns=control_period_ns,
                     spawn_height=heights[robot.id],
                     track_ratio=ratios[robot.id],
-                    namespace=_namespace(scenario, robot),
+                    namespace=_namespace(scenario, robot, layout),
                     layout=layout,
                 )
             )
@@ -193,17 +193,17 @@ def build(
     )
 
 
-def _namespace(scenario: Scenario, robot: RobotConfig) -> str:
-    return "" if len(scenario.robots) == 1 else f"/{robot.id}"
+def _namespace(scenario: Scenario, robot: RobotConfig, layout: Layout) -> str:
+    return f"/{robot.id}" if layout.is_one_of_several or len(scenario.robots) > 1 else ""
 
 
 def _options(scenario: Scenario, layout: Layout) -> NodeOptions | None:
     """Return what robots' nodes are told if several share the graph, simulated or physical ones."""
-    if len(scenario.robots) == 1 and not layout.hardware:
+    if len(scenario.robots) == 1 and not (layout.hardware or layout.is_one_of_several):
         return None
     rules = []
     if layout.commands:
-        spaces = [_namespace(scenario, robot) for robot in scenario.robots]
+        spaces = [_namespace(scenario, robot, layout) for robot in scenario.robots]
         rules = [
             RemapRule(f"{space}/cmd_vel", f"{layout.hardware}{space}/{layout.commands}") for space in spaces
         ]

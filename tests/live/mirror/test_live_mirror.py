@@ -6,12 +6,14 @@ import itertools
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.cable import Cable
-from tests.processes import program, wait_for_listener
+from tests.processes import free_endpoint, program, wait_for_listener
 from twin.bridge.wire.session import SessionConfig
 from twin.geometry import Pose2
 from twin.live.mirror.live_source import LiveSource
@@ -93,6 +95,47 @@ def test_a_robot_that_starts_again_is_followed_again_and_that_is_told(endpoint: 
         clocks = [event for event in watched.robot.events if event.what == "clock"]
         assert len(clocks) == 1
         assert "set by +3" in clocks[0].text
+
+
+TWO = """
+name: two
+duration: 20 s
+robots:
+  - {name: left, model: diff_bot, pose: {y: 1.5}}
+  - {name: right, model: diff_bot, pose: {y: -1.5}}
+missions:
+  - {type: velocity_profile, robot: left, steps: [{duration: 100 s, linear: 0.2 m/s, angular: 20 deg/s}]}
+  - {type: velocity_profile, robot: right, steps: [{duration: 100 s, linear: 0.2 m/s, angular: -20 deg/s}]}
+checks: [{no_collision: }]
+"""
+
+
+def test_two_robots_in_processes_of_their_own_are_followed_each_by_its_clock(
+    endpoint: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "two.yaml"
+    file.write_text(TWO, encoding="utf-8")
+    other = free_endpoint()
+    with ExitStack() as ending:
+        for name, where, offset in (("left", endpoint, "7s"), ("right", other, "-7s")):
+            robot = ("plant", str(file), "--robot", name, "--perturb", f"clock_offset={offset}")
+            ending.enter_context(program(*robot, "--listen", where))
+            wait_for_listener(where)
+        source = LiveSource(SessionConfig(mode="peer", connect=(endpoint, other)))
+        mirror = ending.enter_context(Mirror(load(file), source, autonomy="all"))
+        mirror.advance(
+            lambda: (
+                all(status.judgement.label == "twin" for status in mirror.statuses())
+                or mirror.run.run.world.time_ns > LONG_S * 1e9
+            )
+        )
+        found = {status.robot: status for status in mirror.statuses()}
+    assert {name: status.judgement.label for name, status in found.items()} == {
+        "left": "twin",
+        "right": "twin",
+    }
+    assert found["left"].clock_offset_s == pytest.approx(7.0, abs=0.2)
+    assert found["right"].clock_offset_s == pytest.approx(-7.0, abs=0.2)
 
 
 MUTE = """

@@ -12,6 +12,7 @@ from twin.bridge.msgs import PoseStamped, TFMessage, TransformStamped, Twist, he
 from twin.live.mirror.followed_clock import FollowedClock
 from twin.live.mirror.mirror import Mirror
 from twin.live.mirror.robot_clocks import RobotClocks
+from twin.live.one_robot import one_robot
 from twin.scenario.schema import Scenario, load
 
 SCENARIO = """
@@ -28,7 +29,7 @@ mission:
 checks: [{no_collision: }]
 """
 SECOND = 1_000_000_000
-CLOCKS = {"left": "clock_offset=0.2s", "right": "clock_offset=-0.2s"}
+PERTURBED = {"left": "clock_offset=0.2s,loss=30%", "right": "clock_offset=-0.2s"}
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,10 @@ class Pair:
     """A mirror of both; each has a computer of its own, where the other one is not."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self.plants = {name: plant(scenario, clock, autonomy=True) for name, clock in CLOCKS.items()}
+        self.plants = {
+            name: plant(one_robot(scenario, name), perturb, is_one_of_several=True, autonomy=True)
+            for name, perturb in PERTURBED.items()
+        }
         self.cable = Beside()
         self.mirror = Mirror(scenario, self.cable)
         self.robots = {robot.stack.name: robot for robot in self.mirror.robots}
@@ -50,7 +54,7 @@ class Pair:
         """Largest distance of a virtual robot from where the physical one truly is [m]."""
 
     def start(self, name: str) -> None:
-        self.cable.start(self.plants[name], only=[name])
+        self.cable.start(self.plants[name])
 
     def go_on(self, seconds: float) -> None:
         world = self.mirror.run.run.world
@@ -96,7 +100,7 @@ def test_each_is_followed_by_its_own_clock_and_a_missing_one_is_a_model_alone(pa
     pair.cable.kill(pair.plants["left"])
     pair.go_on(6.0)
     assert pair.labels() == {"left": "model", "right": "shadow"}
-    assert pair.alarms() == {"left": ["silent robot"], "right": []}
+    assert pair.alarms() == {"left": ["lossy link", "silent robot"], "right": []}
     assert [event.what for event in pair.robots["right"].events] == []
     assert pair.errors["right"] < 0.05
 

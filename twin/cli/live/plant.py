@@ -24,6 +24,12 @@ def plant(
             show_default=False,
         ),
     ] = "",
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Only this one of the scenario's robots; others may run in other processes."
+        ),
+    ] = None,
     set: Overrides = None,
     seed: Seed = None,
     autonomy: Annotated[
@@ -54,18 +60,24 @@ def plant(
     from twin.bridge.wire.interrupts import noted_signals
     from twin.bridge.wire.session import SessionConfig
     from twin.cli.run.options import parse_overrides
+    from twin.live.one_robot import one_robot
     from twin.live.perturbations import perturbed
     from twin.live.plant import Plant
     from twin.scenario.schema import load
 
     show_warnings()
     described = load(scenario, parse_overrides(set or (), seed), execute=True)
+    several = robot is not None and len(described.robots) > 1
+    if robot is not None:
+        described = one_robot(described, robot)
     changed, error = perturbed(described, perturb)
     where = tuple(listen or (() if connect else (DEFAULT_ENDPOINT,)))
     network = SessionConfig(
         mode="peer" if where else "client", listen=where, connect=tuple(connect or ()), domain_id=domain
     )
-    robots = Plant(changed, error=error, network=network, autonomy=autonomy, truth=truth)
+    robots = Plant(
+        changed, error=error, network=network, is_one_of_several=several, autonomy=autonomy, truth=truth
+    )
     with robots, noted_signals() as received:
         typer.echo(f"{', '.join(robots.names)} at {', '.join((*where, *(connect or ())))}; Ctrl-C ends it")
         robots.advance(lambda: bool(received))

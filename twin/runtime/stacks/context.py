@@ -22,6 +22,8 @@ class Layout:
     hardware: str = ""
     """Before the namespaces of the hardware's nodes: with `/twin` they are beside a physical robot, which
     autonomy is then about."""
+    is_one_of_several: bool = False
+    """Whether other robots share the graph that are not of this run: the only one has its namespace, too."""
     commands: str = ""
     """Topic on which autonomy commands, behind `hardware` and the robot's namespace; empty: `cmd_vel`."""
 
