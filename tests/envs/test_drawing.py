@@ -1,8 +1,5 @@
 """Pictures and the live view show what is simulated; wrappers of gymnasium go on top."""
 
-from contextlib import contextmanager
-from types import SimpleNamespace
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -104,14 +101,27 @@ def test_wrappers_of_vectors_go_on_top(mode):
 
 
 def test_the_live_view_shows_each_step_where_it_happened(monkeypatch, tmp_path):
-    @contextmanager
-    def viewer(*, web):
-        yield SimpleNamespace(page_url=None)
+    class Unseen:
+        page_url = None
+
+        def __init__(self, tell):
+            pass
+
+        def put(self, act, *, lasting=False):
+            pass
+
+        def finish(self):
+            pass
+
+        def close(self):
+            pass
 
     files = iter([tmp_path / "a.rrd", tmp_path / "b.rrd"])
-    monkeypatch.setattr(episode_view, "live_viewer", viewer)
+    monkeypatch.setattr(episode_view, "LiveScreen", Unseen)
     monkeypatch.setattr(
-        episode_view, "connect", lambda _, app, name, layout: open_recording(next(files), app, name, layout)
+        episode_view,
+        "open_recording",
+        lambda _, app, name, layout, screen: open_recording(next(files), app, name, layout),
     )
     env = DiffDriveGoalEnv(render_mode="human")
     env.reset(seed=0, options=AT)

@@ -115,6 +115,28 @@ def test_what_nobody_reads_is_dropped_and_told_once(
         screen.close()
 
 
+def test_another_recording_follows_on_the_same_screen(
+    viewer: Viewer, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import rerun.blueprint as rrb
+
+    viewer("exec sleep 600")
+    monkeypatch.setattr(live_screen, "_flushed", lambda stream: True)
+    screen = LiveScreen(told.append)
+    seen: list[str] = []
+    try:
+        for name in ("first", "second"):
+            screen.open("twin", name, rrb.Blueprint())
+            screen.put(lambda stream: seen.append(stream.get_recording_id()))
+            screen.finish()
+            screen.put(lambda stream: seen.append("too late"))
+        assert seen == ["first", "second"]
+        assert screen.is_open
+        assert told == []
+    finally:
+        screen.close()
+
+
 def test_a_viewer_that_is_closed_is_told_of_once(
     viewer: Viewer, told: list[str], make_run: Any, verdict: Any, tmp_path: Path
 ) -> None:

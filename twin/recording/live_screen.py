@@ -11,6 +11,7 @@ import subprocess
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from copy import copy
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,8 @@ if TYPE_CHECKING:  # rerun takes 0.4 s to import
     import rerun as rr
     import rerun.blueprint as rrb
 
-    _Act = Callable[[rr.RecordingStream], None]
+    _Act = Callable[[rr.RecordingStream], rr.RecordingStream | None]
+    """Does something with a stream; returns the one that follows it, if there is one."""
 
 LATE_S = 0.5
 """A viewer is as much behind, at most, if it reads."""
@@ -50,7 +52,8 @@ _STOP_S = 3.0
 class LiveScreen:
     """Starts a viewer for one stream: a window where there is a display, else a page for a browser.
 
-    Order: construct, `open`, `put` whatever is to be shown, `finish`; `wait` for the user, `close`.
+    Order: construct, `open`, `put` whatever is to be shown, `finish`; `wait` for the user, `close`. To `open`
+    again is to show another recording from then on.
     """
 
     def __init__(
@@ -75,7 +78,8 @@ class LiveScreen:
         self._acts: SimpleQueue[_Act | None] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
-        self._gone = self._closed = False
+        self._gone = self._closed = self._finished = False
+        self._drained = threading.Event()
         self._lags = False
         self.dropped = 0
         """How many blocks were not shown, since the viewer did not read."""
@@ -103,7 +107,7 @@ class LiveScreen:
         return f"rerun+http://{LOCALHOST}:{self._port}/proxy"
 
     def open(self, application_id: str, recording_id: str, blueprint: rrb.Blueprint) -> None:
-        """Serve a stream, and start its viewer.
+        """Serve a stream, and start its viewer; the streams that follow reach the same viewer.
 
         Raises:
             RecordingError: The page is not served.
@@ -112,6 +116,18 @@ class LiveScreen:
 
         from twin.recording.stream import handed_over, without_clock
 
+        if self._thread is not None:
+            self._finished = False
+
+            def turn(_: rr.RecordingStream) -> rr.RecordingStream:
+                stream = without_clock(rr.RecordingStream, application_id, recording_id)
+                own = copy(blueprint)  # who opened it may be handing it over to a file
+                with handed_over(own):
+                    stream.connect_grpc(self._served, default_blueprint=own)
+                return stream
+
+            self.put(turn, lasting=True)
+            return
         stream = without_clock(rr.RecordingStream, application_id, recording_id)
         served = rr.GrpcServerSink(LOCALHOST, self._port, server_memory_limit=_KEPT)
         with handed_over(blueprint):
@@ -143,7 +159,7 @@ class LiveScreen:
             act: Called in another thread.
             lasting: Later ones may need it: it is dropped only if very much waits.
         """
-        if self._gone:
+        if self._gone or self._finished:
             return
         if self._acts.qsize() < (_MOST_LASTING if lasting else _MOST_WAITING):
             self._acts.put(act)
@@ -159,11 +175,15 @@ class LiveScreen:
         return self._acts.qsize()
 
     def finish(self) -> None:
-        """Send what waits, if the viewer reads; nothing more will come. Harmless when repeated."""
-        if self._thread is not None and not self._gone:
+        """Send what waits, if the viewer reads; no more will come until it is opened again.
+
+        Harmless when repeated.
+        """
+        if self._thread is not None and not (self._gone or self._finished):
+            self._drained.clear()
             self._acts.put(None)
-            self._thread.join(_DRAIN_S)
-            self._gone = True
+            self._drained.wait(_DRAIN_S)
+            self._finished = True
 
     def wait(self) -> None:
         """Wait until the user closes the viewer; a page is served until Ctrl-C."""
@@ -201,23 +221,25 @@ class LiveScreen:
         window = ["--headless", "--window-size", "1600x900"] if self._headless else []
         return [*window, "--port", str(self._viewer_port), "--hide-welcome-screen", "--connect", self._served]
 
-    def _send(self, stream: rr.RecordingStream) -> None:
+    def _send(self, server: rr.RecordingStream) -> None:
         """Do what was put, in a thread of its own, until the viewer is closed."""
-        finished = False
-        while not (finished or self._gone):
+        stream = server
+        while not (self._closed or self._gone):
             acts = self._waiting()
-            finished = None in acts
             for act in acts:
-                if act is not None:
-                    act(stream)
+                following = None if act is None else act(stream)
+                if following is not None:
+                    if stream is not server:
+                        stream.disconnect()
+                    stream = following
             while not (_flushed(stream) or self._closed):
                 pass
+            if None in acts:
+                self._drained.set()
             self._look()
-        # What was served stays: the window may still be reading it, and a page may be loaded again.
-        while not self._closed and self.is_open:
-            with suppress(Empty):
-                self._acts.get(timeout=_LOOK_S)
-        stream.disconnect()
+        # Until then what was served stays: a window may still be reading it, a page be loaded again.
+        for each in {id(stream): stream, id(server): server}.values():
+            each.disconnect()
 
     def _waiting(self) -> list[_Act | None]:
         """Return what waits, after a moment if nothing does."""
@@ -234,7 +256,8 @@ class LiveScreen:
         if process is None or process.poll() is None or self._gone:
             return
         self._gone = True
-        if not self._closed:
+        self._drained.set()
+        if not (self._closed or self._finished):
             what = "was closed" if process.returncode == 0 else f"ended with code {process.returncode}"
             self._tell(f"the viewer {what}: nothing is shown any more, and everything else goes on")
 

@@ -85,7 +85,6 @@ class OpenRun:
         savings: Savings = ALL,
         taps: Sequence[Callable[[Sample[Any]], None]] = (),
         before_nodes: Callable[[World, Bus], None] | None = None,
-        viewer: str | None = None,
         screen: LiveScreen | None = None,
         clock: Clock | None = None,
         layout: Layout = WHOLE,
@@ -112,7 +111,6 @@ class OpenRun:
             savings: What is not done over again; it changes nothing but the speed.
             taps: Called with every sample that a node publishes, from the first one on.
             before_nodes: Called when the world is there, and the bus without a node.
-            viewer: Address of a Rerun viewer that shows the run while it goes on, instead of a recording.
             screen: Shows the run while it goes on, whether it is recorded or not. It changes no result.
             clock: What nodes take for the time; None: simulated time.
             layout: Which nodes of robots there are, and where.
@@ -130,7 +128,7 @@ class OpenRun:
         """What the run was, as far as it went."""
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out if record else None, viewer, screen)
+        self._sink = _recording(scenario, out if record else None, screen)
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
         self._endless = endless
@@ -448,11 +446,9 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(
-    scenario: Scenario, out: Path | None, viewer: str | None, screen: LiveScreen | None
-) -> RerunSink | None:
+def _recording(scenario: Scenario, out: Path | None, screen: LiveScreen | None) -> RerunSink | None:
     kept = out is not None and scenario.recording.enabled
-    if viewer is None and screen is None and not kept:
+    if screen is None and not kept:
         return None
     from twin.recording.live_screen import LATE_S
     from twin.recording.sink import RecordingConfig, RerunSink
@@ -460,10 +456,9 @@ def _recording(
     rates = {name: getattr(scenario.recording, name) for name in ("poses_hz", "images_hz")}
     name = f"{scenario.name}-{scenario.seed}"
     live = RecordingConfig(**rates, loss_s=LATE_S)
-    if viewer is not None:
-        # Each is a recording of its own, which the viewer turns to.
-        return RerunSink(viewer, config=live, recording_id=f"{name}-{uuid.uuid4()}")
     file = out / f"{scenario.name}.rrd" if out is not None and kept else None
+    if file is None:
+        name = f"{name}-{uuid.uuid4()}"  # each is a recording of its own, which the viewer turns to
     config = live if screen is not None else RecordingConfig(**rates)
     return RerunSink(file, config=config, recording_id=name, screen=screen)
 

@@ -48,6 +48,19 @@ def test_a_root_is_in_the_world_until_it_has_a_parent(frames: GraphFrames) -> No
     assert told(tree, 20 * S) == {"map": "world", "odom": "map", "base": "odom"}  # for who comes late
 
 
+def test_what_comes_late_is_shown_after_what_was(frames: GraphFrames) -> None:
+    tree, time = FrameTree(frames), GraphTime(S, simulated=True)
+    time.advance(3 * S)
+    take(tree, time, ("odom", "base", 3 * S, Pose3.from_xyz_rpy()))
+    told(tree, 3 * S)
+    take(tree, time, ("map", "odom", 2 * S, Pose3.from_xyz_rpy()))
+    ((_, times, columns),) = tree.take_chunks(3 * S)
+    children = columns[3].array.flatten().to_pylist()
+    assert times is not None
+    shown_ns = times.array.cast("int64").to_pylist()[children.index("odom")]
+    assert shown_ns == 3 * S  # else that it was in the world would be the latest
+
+
 def test_a_pose_is_that_of_its_stamp(frames: GraphFrames) -> None:
     tree, time = FrameTree(frames), GraphTime(S, simulated=True)
     for i in range(3):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -30,6 +30,9 @@ _STANDS = {True: "pass", False: "fail", None: "open"}
 """How a check stands, by whether it is decided."""
 _SEEDS = 2**31
 """Seeds of runs that are not given are drawn below this."""
+
+if TYPE_CHECKING:
+    from twin.recording.live_screen import LiveScreen
 
 
 class ScenarioEnv(gym.Env[dict[str, Values], Values]):
@@ -114,7 +117,7 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         scenario = self._read
         if options:
             scenario = read_scenario(self._file, {**self._overrides, **options})
-        self._begin(scenario.model_copy(update={"seed": seed}), self._screen.address)
+        self._begin(scenario.model_copy(update={"seed": seed}), self._screen.live)
         spaces: list[gym.Space[Any]] = [self._observer.space, self._agent.action_space]
         if spaces != [self.observation_space, self.action_space]:
             self._end()
@@ -199,12 +202,12 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
             self._episode.close()
             self._episode = None
 
-    def _begin(self, scenario: Scenario, viewer: str | None) -> None:
+    def _begin(self, scenario: Scenario, screen: LiveScreen | None) -> None:
         self._end()
         self._over = False
         with uncollected():
             prepared = self._kind.prepared(scenario, self._config)
-            self._episode = episode = Episode(prepared, self._robot, ticks=self._ticks, viewer=viewer)
+            self._episode = episode = Episode(prepared, self._robot, ticks=self._ticks, screen=screen)
             try:
                 self._agent = self._kind(episode, self._config)
                 self._observer = Observer(episode, self._agent, self._wanted)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.bridge.msgs import ns
 from twin.bridge.qos import QoS
@@ -17,6 +17,9 @@ from twin.runtime.stacks.robot import RobotStack
 from twin.scenario.missions import Idle
 from twin.scenario.schema import Scenario
 from twin.scenario.verdict import Verdict
+
+if TYPE_CHECKING:
+    from twin.recording.live_screen import LiveScreen
 
 
 class Heard:
@@ -40,7 +43,12 @@ class Episode:
     """A run, the robot that the agent is about, its task, and what the agent's node has heard."""
 
     def __init__(
-        self, scenario: Scenario, robot: str | None = None, *, ticks: int = 1, viewer: str | None = None
+        self,
+        scenario: Scenario,
+        robot: str | None = None,
+        *,
+        ticks: int = 1,
+        screen: LiveScreen | None = None,
     ) -> None:
         """Build the run, up to its first tick.
 
@@ -48,14 +56,14 @@ class Episode:
             scenario: What to run.
             robot: Its name; None: the only one, or the only one with a mission.
             ticks: Control periods of a step of the agent.
-            viewer: Address of a Rerun viewer that shows it, at the pace of real time.
+            screen: Shows it, at the pace of real time.
 
         Raises:
             TwinError: The run cannot be made, or has no such robot.
         """
         robot = robot_of(scenario, robot)
         self.scenario = scenario
-        self._opened = OpenRun(scenario, viewer=viewer, pace=None if viewer is None else 1.0)
+        self._opened = OpenRun(scenario, screen=screen, pace=None if screen is None else 1.0)
         self.run = run = self._opened.run
         self.parts, self.world = run.parts, run.world
         self.stack: RobotStack = run.parts.stacks[robot]

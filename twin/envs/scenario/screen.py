@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from twin.envs.scenario.episode import Episode
 
 if TYPE_CHECKING:
     from twin.envs.pictures import Camera
+    from twin.recording.live_screen import LiveScreen
 
 
 _GOAL_M = 0.15
@@ -24,27 +25,27 @@ class Screen:
     def __init__(self, mode: str | None, width: int, height: int) -> None:
         """Take the mode of `gymnasium.Env.render`, and the size of pictures [pixels]."""
         self._mode, self._size = mode, (width, height)
-        self._held = ExitStack()
         self._camera: Camera | None = None
         self._of: Any = None
-        self._address: str | None = None
-        self.page_url: str | None = None
-        """Address of the viewer in a browser; None if it has a window of its own, or there is none."""
+        self._live: LiveScreen | None = None
 
     @property
-    def address(self) -> str | None:
-        """Where a run is shown while it goes on; None unless the mode is `human`.
+    def live(self) -> LiveScreen | None:
+        """Shows a run while it goes on, and is never waited for; None unless the mode is `human`.
 
         Raises:
-            RecordingError: There is no viewer, or it does not start.
+            RecordingError: There is no viewer.
         """
-        if self._mode == "human" and self._address is None:
-            from twin.recording.player import has_display
-            from twin.recording.view.live_viewer import live_viewer
+        if self._mode == "human" and self._live is None:
+            from twin.recording.live_screen import LiveScreen
 
-            viewer = self._held.enter_context(live_viewer(web=not has_display()))
-            self._address, self.page_url = viewer.data_url, viewer.page_url
-        return self._address
+            self._live = LiveScreen(logging.getLogger("twin.envs").warning)
+        return self._live
+
+    @property
+    def page_url(self) -> str | None:
+        """Address of the viewer in a browser; None if it has a window of its own, or there is none."""
+        return None if self._live is None else self._live.page_url
 
     def draw(self, episode: Episode) -> NDArray[np.uint8] | None:
         """Return a picture of the robot and its goal, if the mode is `rgb_array`.
@@ -68,8 +69,9 @@ class Screen:
     def close(self) -> None:
         """End both. Harmless when repeated."""
         self._close_camera()
-        self._held.close()
-        self._address = self.page_url = None
+        if self._live is not None:
+            self._live.close()
+            self._live = None
 
     def _close_camera(self) -> None:
         if self._camera is not None:

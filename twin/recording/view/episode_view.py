@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import logging
+import uuid
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import ArrayLike
 
 from twin.geometry import Array, Pose3
 from twin.models.shapes import Cylinder
 from twin.recording.blueprint import DARK, orbit
 from twin.recording.channels.spatial import SCAN_COLOUR
-from twin.recording.columns import TIMELINE, send, sim_time, transforms
+from twin.recording.columns import TIMELINE, component, send, sim_time, transforms
 from twin.recording.extents import bounds
 from twin.recording.frames import WORLD
-from twin.recording.player import has_display
+from twin.recording.live_screen import LiveScreen
 from twin.recording.shapes import Drawing, Solid, declare_floor, declare_shapes, draw_solids
-from twin.recording.stream import FLUSH_TIMEOUT_S
-from twin.recording.view.live_viewer import connect, live_viewer
+from twin.recording.stream import open_recording
 from twin.sim.shapes import BodyShape
 
 _APPLICATION_ID = "twin-envs"
@@ -32,38 +29,34 @@ class EpisodeView:
     """A viewer's window, or where there is no display, its page for a browser on this computer."""
 
     def __init__(self, shapes: Sequence[BodyShape], pose_of: Callable[[str], Pose3]) -> None:
-        """Start the viewer.
+        """Prepare; the viewer starts with the first episode. Nobody waits for it.
 
         Args:
             shapes: Of everything but the floor.
             pose_of: Returns the pose in the world of what never moves.
 
         Raises:
-            RecordingError: There is no viewer, or it does not start.
+            RecordingError: There is no viewer.
         """
         self._shapes, self._pose_of = tuple(shapes), pose_of
-        self._ending = ExitStack()
-        self._viewer = self._ending.enter_context(live_viewer(web=not has_display()))
-        self.page_url = self._viewer.page_url
+        self._screen = LiveScreen(logging.getLogger("twin.envs").warning)
+        self.page_url = self._screen.page_url
         """Address of the viewer's page; None: it has a window."""
-        if self.page_url:
-            logging.getLogger("twin.envs").warning("no display: the viewer is at %s", self.page_url)
         self._recording: rr.RecordingStream | None = None
 
     def begin(self, name: str, goal: Sequence[float], tolerance: float) -> None:
         """Show a new episode with a name of its own, and its goal at x, y [m], a disc of a radius [m]."""
-        self._disconnect()
         statics = [shape for shape in self._shapes if shape.static]
         low, high = bounds(statics, self._pose_of)
-        self._recording = connect(self._viewer, _APPLICATION_ID, name, _layout(low, high))
+        identity, layout = f"{name} {uuid.uuid4()}", _layout(low, high)
+        self._recording = open_recording(None, _APPLICATION_ID, identity, layout, self._screen)
+        self._screen.put(lambda shown: shown.send_recording_name(name), lasting=True)
         declare_episode(self._recording, self._shapes, self._pose_of)
         disc = Cylinder(radius=tolerance, length=0.01)
         solid = Solid(disc, Pose3.from_xyz_rpy((*goal, 0.005)), _GOAL_RGBA)
         draw_solids(self._recording, [Drawing("/world/goal", WORLD, [solid])])
 
-    def show(
-        self, time_ns: int, names: Sequence[str], xyz: Array, quat_wxyz: Array, points: ArrayLike
-    ) -> None:
+    def show(self, time_ns: int, names: Sequence[str], xyz: Array, quat_wxyz: Array, points: Array) -> None:
         """Show a moment of the episode.
 
         Args:
@@ -77,23 +70,16 @@ class EpisodeView:
         assert recording is not None, "an episode must have begun"
         rows = len(names)
         turned = quat_wxyz[:, [1, 2, 3, 0]]
-        send(recording, [transforms("/tf", sim_time([time_ns] * rows), [WORLD] * rows, names, xyz, turned)])
-        recording.set_time(TIMELINE, duration=np.timedelta64(time_ns, "ns"))
-        colour, radius = [SCAN_COLOUR], rr.Radius.ui_points(2.0)
-        recording.log(
-            "/world/scan", rr.CoordinateFrame(WORLD), rr.Points3D(points, colors=colour, radii=radius)
-        )
-        recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+        times = sim_time([time_ns])
+        poses = transforms("/tf", sim_time([time_ns] * rows), [WORLD] * rows, names, xyz, turned)
+        seen = component(rr.Points3D, "positions").column(points, [len(points)])
+        send(recording, [poses, ("/world/scan", times, (seen,))])
 
     def close(self) -> None:
         """End the viewer."""
-        self._disconnect()
-        self._ending.close()
-
-    def _disconnect(self) -> None:
-        if self._recording is not None:
-            self._recording.disconnect()
-            self._recording = None
+        self._screen.finish()
+        self._screen.close()
+        self._recording = None
 
 
 def declare_episode(
@@ -101,6 +87,8 @@ def declare_episode(
 ) -> None:
     """Log what does not change in an episode: floor and shapes."""
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, rr.CoordinateFrame(WORLD), static=True)
+    look = rr.Points3D.from_fields(colors=[SCAN_COLOUR], radii=rr.Radius.ui_points(2.0))
+    recording.log("/world/scan", rr.CoordinateFrame(WORLD), look, static=True)
     declare_shapes(recording, shapes, pose_of)
     low, high = bounds([shape for shape in shapes if shape.static], pose_of)
     declare_floor(recording, low[:2], high[:2])

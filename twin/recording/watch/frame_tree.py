@@ -76,6 +76,8 @@ class FrameTree:
         """By child: its parent, and its pose there."""
         self._sent: dict[str, tuple[str, _Numbers]] = {}
         self._moved: dict[tuple[str, int], tuple[int, str, str, _Numbers]] = {}
+        self._times: dict[str, int] = {}
+        """By child: of its latest pose; one that comes late is not hidden by it."""
         self._published: set[str] = set()
         self._again_ns = 0
         self.stamp_ns = 0
@@ -158,6 +160,7 @@ class FrameTree:
         for child, edge in latest.items():
             if child not in moved and (everything or self._sent.get(child) != edge):
                 rows.append((now_ns, edge[0], child, edge[1]))
+                self._times[child] = now_ns
         self._sent = latest
         if rows:
             times, parents, children, poses = zip(*rows, strict=True)
@@ -167,4 +170,5 @@ class FrameTree:
     def _put(self, parent: str, child: str, pose: _Numbers, time_ns: int) -> None:
         if self._edges.get(child) != (parent, pose):
             self._edges[child] = (parent, pose)
+            self._times[child] = time_ns = max(time_ns, self._times.get(child, 0))
             self._moved[child, time_ns // _KEPT_NS] = (time_ns, parent, child, pose)
