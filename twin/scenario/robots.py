@@ -9,7 +9,7 @@ from twin.models.catalogue import catalogue
 from twin.parameters import NotNegative, Seconds
 from twin.scenario.detectors import DetectorEntry
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, faultless, known
-from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
+from twin.scenario.localisation import LidarOdometry, Localisation, Odometry, WheelOdometry
 from twin.strict_yaml import Fault, StrictModel
 from twin.strict_yaml.later import later
 
@@ -40,6 +40,8 @@ class RobotConfig(StrictModel):
     """Between a command to its motors and their start [s]; a whole number of control periods."""
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
+    lidar_odometry: LidarOdometry | None = None
+    """Odometry from the clouds of a lidar with layers; absent: none, `{}`: all defaults."""
     localisation: Localisation | None = None
     """Who estimates its pose; absent: nobody."""
     navigation: NavigationConfig | None = None

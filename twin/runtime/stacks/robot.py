@@ -61,6 +61,10 @@ class RobotStack:
         RobotStatePublisherNode(bus, description, namespace=namespace)
         listener = TransformListenerNode(bus, namespace=context.namespace)
         self.robot_pose = RobotPose(listener.buffer, self.frames)
+        if context.config.lidar_odometry is not None:
+            from twin.runtime.stacks.lidar_odometry import build_lidar_odometry
+
+            build_lidar_odometry(context, listener.buffer, self.frames.base)
         self.manipulator = derive.manipulator(description)
         self.footprint = derive.footprint(description) if drive else np.zeros((1, 2))
         self.navigator: BtNavigatorNode | None = None
