@@ -66,7 +66,7 @@ class TagEntry(StrictModel):
 
     @faultless
     def _exists(self) -> Iterator[Fault]:
-        count = FAMILIES[self.family].count
+        count = FAMILIES[self.family].total
         if self.id >= count:
             yield Fault(("id",), f"{self.family} has the ids 0 to {count - 1}, not {self.id}")
 

@@ -50,11 +50,11 @@ def test_a_tag_seen_from_straight_ahead_has_the_right_distance(photo: Photo) -> 
 @pytest.mark.parametrize("family", ["tag16h5", "tag25h9", "tag36h10", "DICT_4X4_50", "DICT_7X7_1000"])
 def test_every_family_is_read_the_same_way_up(photo: Photo, family: str) -> None:
     pose = before_camera(1.0, 0.5, 0.3, 0.9)
-    tag = Tag(name="tag", family=family, number=FAMILIES[family].count - 1, size=0.2, T_world_tag=pose)
+    tag = Tag(name="tag", family=family, number=FAMILIES[family].total - 1, size=0.2, T_world_tag=pose)
     image, lens = photo(tag)
     detector = TagDetector(TagDetectorConfig(family=family, size=0.2))  # type: ignore[arg-type]
     (sight,) = detector.detect(image, lens.matrix, np.zeros(5))
-    assert sight.number == FAMILIES[family].count - 1
+    assert sight.number == FAMILIES[family].total - 1
     assert error_of(sight.T_camera_tag, pose) < (0.003, 1.0)
 
 
