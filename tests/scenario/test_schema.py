@@ -247,3 +247,11 @@ checks: [{no_collision: }]
         "demo.yaml:4: tag36h11 has the ids 0 to 586, not 587",
         "demo.yaml:5: tags are found in images, but this robot's cameras are off",
     ]
+
+
+def test_two_tags_of_one_number_need_names(tmp_path: Path) -> None:
+    twice = "[{id: 3, size: 16 cm, pose: {x: 1}}, {id: 3, size: 16 cm, pose: {x: 2}}]"
+    text = f"name: demo\nduration: 1 s\nworld: {{tags: {twice}}}\nrobots: [{{model: diff_bot}}]\nchecks: [{{no_collision: }}]\n"
+    assert faults(tmp_path, text) == [
+        "demo.yaml:3: there is a tag 'tag36h11:3' before; give this one a name of its own"
+    ]

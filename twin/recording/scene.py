@@ -87,7 +87,7 @@ def _shapes(columns: dict[str, Column]) -> Iterator[tuple[Any, Pose3, tuple[floa
             else:
                 shape = Sphere(radius=part["half_sizes"][i][0])
             yield shape, at, _rgba(colour)
-    if "Mesh3D:vertex_positions" in columns:
+    if "Mesh3D:vertex_colors" in columns:  # others are pictures
         corners = np.array(columns["Mesh3D:vertex_positions"].values[0]).reshape(-1, 3, 3)
         colours = np.array(columns["Mesh3D:vertex_colors"].values[0][::3], dtype=np.uint32)
         for colour in np.unique(colours):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from rerun.components import FillMode
 
 from twin.geometry import Array, Pose3, matrix_from_quat_wxyz, xyzw_from_wxyz
@@ -15,11 +16,16 @@ from twin.models.mesh.meshes import read_mesh
 from twin.models.shapes import Box, Capsule, Cylinder, Geometry, Mesh, Sphere
 from twin.recording.columns import Column, component, send
 from twin.recording.frames import WORLD
+from twin.sim.looks.materials import MATERIALS, texture
+from twin.sim.looks.surfaces import Surface, joined, of_box, of_picture
 
 if TYPE_CHECKING:
+    from twin.sim.scene import Decal
     from twin.sim.shapes import BodyShape
 
 FLOOR_COLOUR = (96, 100, 106, 255)
+MOST_PIXELS = 512
+"""Along an edge of a picture in a recording, which is not to be larger for its looks."""
 FLOOR_MARGIN = 1.0
 """Around the outermost shapes [m]."""
 
@@ -55,6 +61,8 @@ def declare_shapes(
 ) -> None:
     """Log every shape once, solid: scenery in `world`, the rest in the frame that carries its body's name.
 
+    Boxes of scenery with a texture are gathered by material, as each mesh has a copy of its texture.
+
     Args:
         recording: Where to.
         shapes: Any order.
@@ -63,12 +71,57 @@ def declare_shapes(
     by_body: dict[tuple[str, bool], list[BodyShape]] = {}
     for shape in shapes:
         by_body.setdefault((shape.body, shape.static), []).append(shape)
-    drawings = []
+    drawings, textured = [], dict[str, list[tuple[Surface, Rgba8]]]()
     for (body, static), group in by_body.items():
         T_frame_body = pose_of(body) if static else Pose3.from_xyz_rpy()
-        solids = [Solid(s.geometry, T_frame_body @ s.T_body_geometry, rgba8(s.rgba)) for s in group]
+        solids = []
+        for shape in group:
+            pose, colour = T_frame_body @ shape.T_body_geometry, rgba8(shape.rgba)
+            if static and isinstance(shape.geometry, Box) and texture(shape.material) is not None:
+                surface = of_box(shape.geometry, pose, MATERIALS[shape.material].tile)
+                textured.setdefault(shape.material, []).append((surface, colour))
+            else:
+                solids.append(Solid(shape.geometry, pose, colour))
         drawings.append(Drawing(body_entity(body, static), WORLD if static else body, solids))
     draw_solids(recording, drawings)
+    for material, parts in textured.items():
+        colours = [np.tile(np.array(colour, np.uint8), (len(part.points), 1)) for part, colour in parts]
+        surface, picture = joined(part for part, _ in parts), texture(material)
+        assert picture is not None
+        _declare_surface(
+            recording, f"/world/surfaces/{material}", WORLD, surface, picture, np.vstack(colours)
+        )
+
+
+def declare_decals(recording: rr.RecordingStream, decals: Iterable[Decal]) -> None:
+    """Log pictures that are stuck to bodies or the world; large ones with every n-th pixel."""
+    for decal in decals:
+        step = -(-max(decal.picture.shape) // MOST_PIXELS)
+        surface = of_picture(decal.size, decal.T_body_decal)
+        entity = rr.new_entity_path(["world", "decals", decal.name])
+        _declare_surface(recording, entity, decal.body or WORLD, surface, decal.picture[::step, ::step])
+
+
+def _declare_surface(
+    recording: rr.RecordingStream,
+    entity: str,
+    frame: str,
+    surface: Surface,
+    picture: NDArray[np.uint8],
+    colours: NDArray[np.uint8] | None = None,
+) -> None:
+    recording.log(
+        entity,
+        rr.CoordinateFrame(frame),
+        rr.Mesh3D(
+            vertex_positions=surface.points.astype(np.float32),
+            vertex_normals=surface.normals.astype(np.float32),
+            vertex_texcoords=surface.texcoords.astype(np.float32),
+            vertex_colors=colours,
+            albedo_texture=np.ascontiguousarray(picture),
+        ),
+        static=True,
+    )
 
 
 def draw_solids(

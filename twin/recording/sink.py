@@ -152,7 +152,7 @@ class RerunSink:
         from twin.recording.channels.pictures import picture_entity
         from twin.recording.extents import Stage, robot_box
         from twin.recording.poses import Poses
-        from twin.recording.shapes import declare_shapes
+        from twin.recording.shapes import declare_decals, declare_shapes
         from twin.recording.stream import declare_frames, open_recording
 
         self._world = world
@@ -188,6 +188,7 @@ class RerunSink:
         declare_frames(self._recording, frames)
         self._set_stage()
         declare_shapes(self._recording, shapes, world.pose)
+        declare_decals(self._recording, world.scene.decals)
         self._next_pose_ns = world.time_ns
         self.on_tick(world)
         self._takers.clear()

@@ -64,6 +64,11 @@ class TagEntry(StrictModel):
     pose: SpacePoseConfig
     """Middle of its face, in the world; x out of the face, z up along it."""
 
+    @property
+    def title(self) -> str:
+        """Its name."""
+        return self.name or f"{self.family}:{self.id}"
+
     @faultless
     def _exists(self) -> Iterator[Fault]:
         count = FAMILIES[self.family].total
@@ -98,6 +103,13 @@ class WorldConfig(StrictModel):
     """Goods that differ from the arena's."""
     tags: tuple[TagEntry, ...] = ()
     """Printed tags for cameras."""
+
+    @faultless
+    def _tags_differ(self) -> Iterator[Fault]:
+        titles = [tag.title for tag in self.tags]
+        for i, title in enumerate(titles):
+            if title in titles[:i]:
+                yield Fault(("tags", i), f"there is a tag '{title}' before; give this one a name of its own")
 
 
 class PhysicsConfig(StrictModel):

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from twin.geometry import Pose3
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
@@ -24,6 +29,8 @@ class Shape:
     rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
     solid: bool = True
     """False for paint: seen, but without mass, never touched and not hit by rays."""
+    material: str = ""
+    """One of `twin.sim.looks.materials`, tinted by `rgba`; empty: plain paint."""
 
     def __post_init__(self) -> None:
         _keep(self.T_body_geometry)
@@ -62,21 +69,30 @@ class PlacedBody(Body):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tag:
-    """A printed square with a number, for cameras; nothing touches it, and no lidar sees it."""
+class Decal:
+    """A flat picture that is stuck to something: seen by those who see colours, by nothing else.
+
+    It has no thickness, no mass and no depth. Put it a millimetre in front of what it is on.
+    """
 
     name: str
-    family: str
-    """One of `twin.perception.tags.families.FAMILIES`."""
-    number: int
-    """Its id."""
-    size: float
-    """Side of its black border [m], as AprilTag counts."""
-    T_world_tag: Pose3
-    """x out of its face, z up along it."""
+    """Unlike that of any other decal."""
+    size: tuple[float, float]
+    """Width and height [m]."""
+    T_body_decal: Pose3
+    """Its middle: x to the right in the picture, y up, z towards the one who looks."""
+    body: str = ""
+    """On which: a link `<robot>/<link>`, goods, or nothing for the world."""
+    paint: Callable[[], NDArray[np.uint8]] = field(compare=False)
+    """Returns the picture, shape (height, width, 3), the upper row first; called once, when it is drawn."""
 
     def __post_init__(self) -> None:
-        _keep(self.T_world_tag)
+        _keep(self.T_body_decal)
+
+    @cached_property
+    def picture(self) -> NDArray[np.uint8]:
+        """What is on it, shape (height, width, 3)."""
+        return self.paint()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,4 +106,4 @@ class Scene:
     statics: tuple[StaticBody, ...] = ()
     goods: tuple[FreeBody, ...] = ()
     placed: tuple[PlacedBody, ...] = ()
-    tags: tuple[Tag, ...] = ()
+    decals: tuple[Decal, ...] = ()

@@ -22,6 +22,8 @@ class BodyShape:
     rgba: Rgba
     static: bool
     """True when the body never moves (scenery)."""
+    material: str = ""
+    """One of `twin.sim.looks.materials`."""
 
 
 def shapes(scene: Scene, robots: Sequence[RobotPlacement]) -> Iterator[BodyShape]:
@@ -34,6 +36,7 @@ def shapes(scene: Scene, robots: Sequence[RobotPlacement]) -> Iterator[BodyShape
                 T_body_geometry=shape.T_body_geometry,
                 rgba=shape.rgba,
                 static=isinstance(body, StaticBody),
+                material=shape.material,
             )
     for robot in robots:
         for link in robot.conversion.description.links.values():

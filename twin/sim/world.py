@@ -271,7 +271,9 @@ class World:
 
     def spec_to_see(self) -> mujoco.MjSpec:
         """Return the model to see before it is compiled, for those who add something to it."""
-        return build_spec(self.scene, self._placements, self.physics)
+        from twin.sim.looks.dress import dressed
+
+        return dressed(self.scene, self._placements, self.physics)
 
     @cached_property
     def eyes(self) -> Eyes:

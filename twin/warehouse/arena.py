@@ -12,9 +12,9 @@ from twin import strict_yaml
 from twin.errors import ScenarioError, nearest
 from twin.files.kept import hash_of
 from twin.geometry import Pose2
-from twin.sim.scene import Scene, StaticBody
+from twin.sim.scene import Decal, Scene, StaticBody
 from twin.warehouse.arena_file import ArenaFile, RackEntry, TableEntry, slot_count
-from twin.warehouse.arena_scene import PALETTE, goods, structure
+from twin.warehouse.arena_scene import PALETTE, decals, goods, structure
 from twin.warehouse.catalogue import catalogue
 from twin.warehouse.footprint import Rectangle
 from twin.warehouse.shelf import Shelf, Slot, Tote, Zone
@@ -158,12 +158,18 @@ class Arena:
             floor_size=(2.0 * max(map(abs, x)) + 4.0, 2.0 * max(map(abs, y)) + 4.0),
             statics=(*self.structure, *stock, *obstacles),
             goods=free,
+            decals=self.decals,
         )
 
     @cached_property
     def structure(self) -> tuple[StaticBody, ...]:
         """Everything that is the same in each run: walls, racks, pallets, tables, paint; not the totes."""
         return tuple(structure(self))
+
+    @cached_property
+    def decals(self) -> tuple[Decal, ...]:
+        """What is painted on the floor, and the signs on racks."""
+        return tuple(decals(self))
 
     # -- from the file ---------------------------------------------------------------------------------------
 

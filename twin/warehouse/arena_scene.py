@@ -6,15 +6,17 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache, partial
 from itertools import pairwise
+from string import ascii_uppercase
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box, Cylinder
 from twin.sim.noise import NoiseStream
-from twin.sim.scene import FreeBody, Rgba, Shape, StaticBody
+from twin.sim.scene import Decal, FreeBody, Rgba, Shape, StaticBody
 from twin.warehouse.arena_file import CylindersEntry, PartitionEntry, RackEntry, ToteKind
 
 if TYPE_CHECKING:
@@ -52,6 +54,10 @@ _UPRIGHT = 0.05
 _PAINT = 0.002
 """Paint stands proud of what it is on by this much, or a renderer could not tell which is in front [m]."""
 _STRIPE = 0.06
+_STUCK = 0.001
+"""How far decals are in front of what they are on [m]."""
+_UPRIGHT_PICTURE = Pose3.from_xyz_rpy((0.0, 0.0, 0.0), (math.pi / 2.0, 0.0, math.pi / 2.0))
+"""A picture that faces x, in the frame of what it is on."""
 _ORIGIN = Pose2(0.0, 0.0, 0.0)
 _DECK = 0.144
 """Height of a EUR pallet [m]."""
@@ -73,16 +79,63 @@ def structure(arena: Arena) -> Iterator[StaticBody]:
         yield _body(
             name,
             Pose2(*pallet.pose),
-            box((1.2, 0.8, _DECK), (0.0, 0.0, _DECK / 2.0), PALETTE["wood"]),
-            box((1.1, 0.74, load), middle, _CARDBOARD),
+            box((1.2, 0.8, _DECK), (0.0, 0.0, _DECK / 2.0), PALETTE["wood"], "wood"),
+            box((1.1, 0.74, load), middle, _CARDBOARD, "cardboard"),
             box((1.1 + 2 * _PAINT, 0.08, load + _PAINT), middle, _TAPE, solid=False),
         )
     for name, obstacle in file.obstacles.items():
-        yield _block(name, Pose2(*obstacle.pose), obstacle.size, PALETTE[obstacle.colour])
+        yield _block(
+            name,
+            Pose2(*obstacle.pose),
+            obstacle.size,
+            PALETTE[obstacle.colour],
+            "wood" if obstacle.colour == "wood" else "steel",
+        )
     for name, cylinders in file.cylinders.items():
         yield _cylinders(name, cylinders)
     for zone in arena.zones.values():
         yield from _zone(zone)
+
+
+def decals(arena: Arena) -> Iterator[Decal]:
+    """Yield what is painted on the floor, and a sign with a number on each bay of a rack, front and back."""
+    if arena.file.hall.walls:
+        hall = arena.hall
+        racks, zones = tuple(arena.racks.values()), tuple(arena.zones.values())
+        yield Decal(
+            name="floor",
+            size=(hall.size_x, hall.size_y),
+            T_body_decal=Pose3.from_xyz_rpy((hall.centre.x, hall.centre.y, _STUCK)),
+            paint=partial(_floor, hall, zones, racks, arena.structure),
+        )
+    for letter, (name, entry) in zip(ascii_uppercase, arena.file.racks.items(), strict=False):
+        bays = max(1, round(entry.length / entry.bay))
+        height = min(0.16, 0.7 * entry.levels[0])
+        z = min(entry.levels[0] / 2.0, 0.25)
+        for bay in range(bays):
+            along = ((bay + 0.5) / bays - 0.5) * (entry.length - _UPRIGHT)
+            for yaw in (0.0, math.pi):
+                side = Pose2(*entry.pose) @ Pose2(0.0, 0.0, yaw)
+                out = entry.depth / 2.0 + _STUCK
+                at = Pose3.from_pose2(side @ Pose2(out, along if yaw == 0.0 else -along, 0.0), z)
+                yield Decal(
+                    name=f"{name} {bay + 1} {'back' if yaw else 'front'}",
+                    size=(2.0 * height, height),
+                    T_body_decal=at @ _UPRIGHT_PICTURE,
+                    paint=partial(_sign, f"{letter}{bay + 1}"),
+                )
+
+
+def _floor(*seen: Any) -> NDArray[np.uint8]:
+    from twin.warehouse.floor_paint import floor  # only who draws needs fonts
+
+    return floor(*seen)
+
+
+def _sign(words: str) -> NDArray[np.uint8]:
+    from twin.warehouse.floor_paint import sign
+
+    return sign(words)
 
 
 @lru_cache(maxsize=8)
@@ -141,14 +194,22 @@ def _placement_error(seed: int, name: str, jitter: tuple[float, float]) -> Pose3
 
 
 def box(
-    size: tuple[float, float, float], xyz: tuple[float, float, float], rgba: Rgba, *, solid: bool = True
+    size: tuple[float, float, float],
+    xyz: tuple[float, float, float],
+    rgba: Rgba,
+    material: str = "",
+    *,
+    solid: bool = True,
 ) -> Shape:
     """Return a box with its centre at `xyz` of its body [m]."""
-    return Shape(geometry=Box(size=size), T_body_geometry=Pose3.from_xyz_rpy(xyz), rgba=rgba, solid=solid)
+    at = Pose3.from_xyz_rpy(xyz)
+    return Shape(geometry=Box(size=size), T_body_geometry=at, rgba=rgba, solid=solid, material=material)
 
 
-def _block(name: str, pose: Pose2, size: tuple[float, float, float], rgba: Rgba) -> StaticBody:
-    return _body(name, pose, box(size, (0.0, 0.0, size[2] / 2.0), rgba))
+def _block(
+    name: str, pose: Pose2, size: tuple[float, float, float], rgba: Rgba, material: str = ""
+) -> StaticBody:
+    return _body(name, pose, box(size, (0.0, 0.0, size[2] / 2.0), rgba, material))
 
 
 def _body(name: str, pose: Pose2, *shapes: Shape) -> StaticBody:
@@ -163,10 +224,10 @@ def _walls(arena: Arena) -> StaticBody:
     return _body(
         "walls",
         _ORIGIN,
-        box(along_x, (cx, y0 - t / 2.0, z), _WALL),
-        box(along_x, (cx, y1 + t / 2.0, z), _WALL),
-        box(along_y, (x0 - t / 2.0, cy, z), _WALL),
-        box(along_y, (x1 + t / 2.0, cy, z), _WALL),
+        box(along_x, (cx, y0 - t / 2.0, z), _WALL, "plaster"),
+        box(along_x, (cx, y1 + t / 2.0, z), _WALL, "plaster"),
+        box(along_y, (x0 - t / 2.0, cy, z), _WALL, "plaster"),
+        box(along_y, (x1 + t / 2.0, cy, z), _WALL, "plaster"),
     )
 
 
@@ -187,18 +248,19 @@ def _rack(name: str, rack: RackEntry) -> StaticBody:
     """Plinth up to the lowest level, a board for each other level, uprights, painted beams."""
     depth, length = rack.depth, rack.length
     lowest, top = rack.levels[0], rack.levels[-1] + rack.headroom
-    shapes = [box((depth, length, lowest), (0.0, 0.0, lowest / 2.0), _PLINTH)]
+    shapes = [box((depth, length, lowest), (0.0, 0.0, lowest / 2.0), _PLINTH, "steel")]
     board = (depth - 2.0 * _PAINT, length - 2.0 * _PAINT, _BOARD_THICKNESS)
-    shapes += [box(board, (0.0, 0.0, z - _BOARD_THICKNESS / 2.0), _BOARD) for z in rack.levels[1:]]
+    shapes += [box(board, (0.0, 0.0, z - _BOARD_THICKNESS / 2.0), _BOARD, "board") for z in rack.levels[1:]]
     beam = (depth + 2.0 * _PAINT, length - 2.0 * _UPRIGHT, 0.055)
     shapes += [
-        box(beam, (0.0, 0.0, z - 0.0275 - _PAINT), PALETTE["orange"], solid=False) for z in rack.levels
+        box(beam, (0.0, 0.0, z - 0.0275 - _PAINT), PALETTE["orange"], "steel", solid=False)
+        for z in rack.levels
     ]
     # Uprights stand within the rack's length and depth, front and back, between the bays.
     edge = (length - _UPRIGHT) / 2.0
     post = (_UPRIGHT, _UPRIGHT, top - lowest)
     shapes += [
-        box(post, (side * (depth - _UPRIGHT) / 2.0, float(y), (top + lowest) / 2.0), PALETTE["blue"])
+        box(post, (side * (depth - _UPRIGHT) / 2.0, float(y), (top + lowest) / 2.0), PALETTE["blue"], "steel")
         for y in np.linspace(-edge, edge, max(1, round(length / rack.bay)) + 1)
         for side in (-1.0, 1.0)
     ]
@@ -211,7 +273,7 @@ def _tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, .
     light, dark = _mixed(rgba, 1.0, 0.35), _mixed(rgba, 0.0, 0.55)
     p = 2.0 * _PAINT
     return (
-        box(size, (0.0, 0.0, 0.0), rgba),
+        box(size, (0.0, 0.0, 0.0), rgba, "plastic"),
         box((depth + p, width + p, 0.022), (0.0, 0.0, height / 2.0 - 0.01), light, solid=False),
         box((depth - 0.03, width - 0.03, p), (0.0, 0.0, height / 2.0 + 0.001), dark, solid=False),
         box((p, 0.10, 0.06), (depth / 2.0, 0.0, -0.015), PALETTE["white"], solid=False),
@@ -222,7 +284,7 @@ def _carton_shapes(size: tuple[float, float, float]) -> tuple[Shape, ...]:
     depth, width, height = size
     p = 2.0 * _PAINT
     return (
-        box(size, (0.0, 0.0, 0.0), _CARDBOARD),
+        box(size, (0.0, 0.0, 0.0), _CARDBOARD, "cardboard"),
         box((depth + p, 0.05, height + p), (0.0, 0.0, 0.0), _TAPE, solid=False),
         box((p, 0.08, 0.06), (depth / 2.0, width / 4.0, 0.02), PALETTE["white"], solid=False),
     )
@@ -251,6 +313,6 @@ def _zone(zone: Zone) -> Iterator[StaticBody]:
         yield _body(
             f"{zone.name}_table",
             zone.table.pose,
-            box((depth, length, height), (0.0, 0.0, height / 2.0), PALETTE["grey"]),
+            box((depth, length, height), (0.0, 0.0, height / 2.0), PALETTE["grey"], "steel"),
             paint(edge, (0.0, 0.0, height - 0.025 - _PAINT)),
         )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from twin.convert.sensors import add_camera
 from twin.errors import SimulationError
 from twin.sim.canvas import Canvas
+from twin.sim.compose import GROUP_PAINT
 
 if TYPE_CHECKING:
     from twin.sim.cameras.camera import Camera
@@ -73,20 +74,25 @@ class Eyes:
         near, far = camera.spec.near, camera.spec.far
         clip, extent = self._model.vis.map, self._model.stat.extent
         clip.znear, clip.zfar = near / extent, far / extent
-        everything = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(
-            self._model, self._data, self._options, None, self._views[id(camera)], everything, self._scene
-        )
         self.drawn += colours + depth
-        size = camera.source.size
-        return (
-            self._canvas.draw(self._scene, *size) if colours else _NO_COLOURS,
-            _metres(self._canvas.nearness(self._scene, *size), near, far) if depth else _NO_DEPTH,
-        )
+        size, seen, distances = camera.source.size, _NO_COLOURS, _NO_DEPTH
+        if colours:
+            self._update(camera, paint=True)
+            seen = self._canvas.draw(self._scene, *size)
+        if depth:
+            self._update(camera, paint=False)
+            distances = _metres(self._canvas.nearness(self._scene, *size), near, far)
+        return seen, distances
 
     def close(self) -> None:
         """Free what the graphics driver holds. Harmless when repeated."""
         self._canvas.close()
+
+    def _update(self, camera: Camera, *, paint: bool) -> None:
+        """Have what is to be drawn; what is paint only has no depth, as it is nothing to rays."""
+        self._options.geomgroup[GROUP_PAINT] = paint
+        view, everything = self._views[id(camera)], mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(self._model, self._data, self._options, None, view, everything, self._scene)
 
     def _take_state(self) -> None:
         """Have everything where it is in the world."""

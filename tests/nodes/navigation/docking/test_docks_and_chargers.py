@@ -31,7 +31,7 @@ from twin.navigation.docking.docks import Dock as DockEntry
 from twin.navigation.docking.docks import DockDatabase, DockType
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.docking.config import DockingServerConfig
-from twin.sim.tags import T_TAG_PRINT
+from twin.sim.looks.tags import T_TAG_PRINT
 
 CHARGER = DockType(is_charger=True, face_width=0.6)
 

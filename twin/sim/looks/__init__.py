@@ -1,0 +1,1 @@
+"""What a world looks like: materials, textures, decals; only the model that is drawn has them."""
