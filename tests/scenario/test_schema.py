@@ -78,7 +78,7 @@ def test_a_whole_scenario(tmp_path: Path) -> None:
         ("    navigation: {}", "    command_latency: 30 ms", "demo.yaml:9: the latency of commands (30 ms) must be a whole number of control periods (20 ms)"),
         ("pick_and_place\n  robot: bot\n  tasks: [{tote: tote_a, to: unloading}]", "r2d2_state_publisher\n  robot: bot\n  rate: 1 kHz", "demo.yaml:13: the rate of the publisher (1000 Hz) must be at most 50 Hz, one per control period (20 ms)"),
         ("{arena: warehouse}", "{arna: warehouse}", "demo.yaml:3: unknown key 'arna' in world; did you mean 'arena'? Valid: arena, goods, obstacles"),
-        ("    start: start", "    strat: start", "demo.yaml:7: unknown key 'strat' in robots.0; did you mean 'start'? Valid: args, "),
+        ("    start: start", "    strat: start", "demo.yaml:7: unknown key 'strat' in robots.0; did you mean 'start'? Valid: apriltag, args, "),
         ("    start: start", "    start: start\n    pose: {x: 1}", "demo.yaml:7: give the robot either a pose or the name of a start, not both"),
         ("{type: amcl}", "{type: amlc}", "demo.yaml:8: robots.0.localisation.type: unknown value 'amlc'; did you mean 'amcl'? Valid: amcl, none, odometry, slam"),
         ("{type: amcl}", "{type: none}", "demo.yaml:9: navigation needs a localisation of type odometry, amcl or slam"),
@@ -246,4 +246,12 @@ checks: [{no_collision: }]
     assert faults(tmp_path, text) == [
         "demo.yaml:4: tag36h11 has the ids 0 to 586, not 587",
         "demo.yaml:5: tags are found in images, but this robot's cameras are off",
+    ]
+
+
+def test_two_tags_of_one_number_need_names(tmp_path: Path) -> None:
+    twice = "[{id: 3, size: 16 cm, pose: {x: 1}}, {id: 3, size: 16 cm, pose: {x: 2}}]"
+    text = f"name: demo\nduration: 1 s\nworld: {{tags: {twice}}}\nrobots: [{{model: diff_bot}}]\nchecks: [{{no_collision: }}]\n"
+    assert faults(tmp_path, text) == [
+        "demo.yaml:3: there is a tag 'tag36h11:3' before; give this one a name of its own"
     ]

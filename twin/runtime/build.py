@@ -43,9 +43,10 @@ from twin.scenario.robots import RobotConfig
 from twin.scenario.schema import Scenario
 from twin.scenario.world import Obstacle, TagEntry
 from twin.sim.drive_check import calibrated_track_ratio
+from twin.sim.looks.tags import tag_decal
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import FreeBody, PlacedBody, Scene, Shape, StaticBody, Tag
+from twin.sim.scene import Decal, FreeBody, PlacedBody, Scene, Shape, StaticBody
 from twin.sim.world import World
 
 if TYPE_CHECKING:
@@ -248,14 +249,14 @@ def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) 
     tags = tuple(map(_tag, scenario.world.tags))
     if arena is None:
         return Scene(
-            name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed, tags=tags
+            name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed, decals=tags
         )
     carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
     totes = (task.tote for mission in carriers for task in mission.tasks)
     given = {good.name: good.properties for good in scenario.world.goods}
     scene = arena.scene({*given, *totes}, seed=scenario.seed, obstacles=statics)
     goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]
-    return replace(scene, goods=(*goods, *movable), placed=placed, tags=tags)
+    return replace(scene, goods=(*goods, *movable), placed=placed, decals=(*scene.decals, *tags))
 
 
 def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeBody | PlacedBody:
@@ -270,13 +271,9 @@ def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeB
     return kind(name=name, T_world_body=pose, shapes=shapes, friction=friction)
 
 
-def _tag(entry: TagEntry) -> Tag:
-    return Tag(
-        name=entry.name or f"{entry.family}:{entry.id}",
-        family=entry.family,
-        number=entry.id,
-        size=entry.size,
-        T_world_tag=entry.pose.pose,
+def _tag(entry: TagEntry) -> Decal:
+    return tag_decal(
+        name=entry.title, family=entry.family, number=entry.id, size=entry.size, T_world_tag=entry.pose.pose
     )
 
 

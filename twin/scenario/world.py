@@ -68,9 +68,14 @@ class TagEntry(StrictModel):
     pose: SpacePoseConfig
     """Middle of its face, in the world; x out of the face, z up along it."""
 
+    @property
+    def title(self) -> str:
+        """Its name."""
+        return self.name or f"{self.family}:{self.id}"
+
     @faultless
     def _exists(self) -> Iterator[Fault]:
-        count = FAMILIES[self.family].count
+        count = FAMILIES[self.family].total
         if self.id >= count:
             yield Fault(("id",), f"{self.family} has the ids 0 to {count - 1}, not {self.id}")
 
@@ -102,6 +107,13 @@ class WorldConfig(StrictModel):
     """Goods that differ from the arena's."""
     tags: tuple[TagEntry, ...] = ()
     """Printed tags for cameras."""
+
+    @faultless
+    def _tags_differ(self) -> Iterator[Fault]:
+        titles = [tag.title for tag in self.tags]
+        for i, title in enumerate(titles):
+            if title in titles[:i]:
+                yield Fault(("tags", i), f"there is a tag '{title}' before; give this one a name of its own")
 
 
 class PhysicsConfig(StrictModel):

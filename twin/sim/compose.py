@@ -14,9 +14,8 @@ from twin.models.solids import volume
 from twin.sim.casters import casters_under_chassis
 from twin.sim.physics import Physics
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import Body, FreeBody, PlacedBody, Scene, Shape, StaticBody, Tag
+from twin.sim.scene import Body, FreeBody, PlacedBody, Scene, Shape, StaticBody
 from twin.sim.servos import keep_velocity_limit
-from twin.sim.tags import add_tag
 
 FLOOR = "floor"
 """Name of the floor's geom."""
@@ -39,7 +38,7 @@ def build_spec(
 ) -> mujoco.MjSpec:
     """Return the uncompiled world; elements of robot `r` are named `r/<name>`.
 
-    Without the robots' visual geoms and the tags it moves in the same way.
+    Without the robots' visual geoms it moves in the same way.
 
     Raises:
         ScenarioError: Two things have the same name.
@@ -60,8 +59,6 @@ def build_spec(
         _add_goods(spec, goods, solref)
     for placed in scene.placed:
         _add_placed(spec, placed, solref)
-    for tag in scene.tags if visuals else ():
-        add_tag(spec, paint, tag, GROUP_PAINT)
     for placement in robots:
         _attach(spec, placement, visuals)
     _let_lower_friction_act(spec, scene.goods)
@@ -74,13 +71,7 @@ def static_geom(name: str, index: int) -> str:
 
 
 def _check_names(scene: Scene, robots: Sequence[RobotPlacement]) -> None:
-    named: tuple[Body | Tag | RobotPlacement, ...] = (
-        *scene.statics,
-        *scene.goods,
-        *scene.placed,
-        *scene.tags,
-        *robots,
-    )
+    named: tuple[Body | RobotPlacement, ...] = (*scene.statics, *scene.goods, *scene.placed, *robots)
     names = Counter([FLOOR, *(thing.name for thing in named)])
     problems = [
         Problem(f"{count} things in scene '{scene.name}' have the name '{name}'; give each its own")

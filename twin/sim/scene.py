@@ -96,24 +96,6 @@ class Decal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tag:
-    """A printed square with a number, for cameras; nothing touches it, and no lidar sees it."""
-
-    name: str
-    family: str
-    """One of `twin.perception.tags.families.FAMILIES`."""
-    number: int
-    """Its id."""
-    size: float
-    """Side of its black border [m], as AprilTag counts."""
-    T_world_tag: Pose3
-    """x out of its face, z up along it."""
-
-    def __post_init__(self) -> None:
-        _keep(self.T_world_tag)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Scene:
     """The floor (plane z = 0) and what stands on it."""
 
@@ -125,4 +107,3 @@ class Scene:
     goods: tuple[FreeBody, ...] = ()
     placed: tuple[PlacedBody, ...] = ()
     decals: tuple[Decal, ...] = ()
-    tags: tuple[Tag, ...] = ()

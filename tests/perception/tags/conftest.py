@@ -13,9 +13,9 @@ from twin.convert import convert
 from twin.geometry import Pose3
 from twin.models.lens import Lens
 from twin.models.loader import parse_urdf
+from twin.sim.looks.tags import T_TAG_PRINT
 from twin.sim.robot import RobotPlacement
-from twin.sim.scene import Scene, Tag
-from twin.sim.tags import T_TAG_PRINT
+from twin.sim.scene import Decal, Scene
 from twin.sim.world import World
 
 URDF = """<robot name="mast"><link name="base">
@@ -53,12 +53,12 @@ def photo() -> Iterator[Photo]:
     """Return pictures of tags, and the lens through which they were taken."""
     with ExitStack() as ending:
 
-        def take(*tags: Tag, seed: int = 0, inside: str = "") -> tuple[np.ndarray, Lens]:
+        def take(*tags: Decal, seed: int = 0, inside: str = "") -> tuple[np.ndarray, Lens]:
             description = parse_urdf(URDF.format(inside=inside), Path("mast.urdf"))
             mast = RobotPlacement(
                 name="mast", conversion=convert(description, base="fixed"), pose=Pose3.from_xyz_rpy()
             )
-            world = World.compose(Scene(name="room", tags=tags), [mast], seed=seed)
+            world = World.compose(Scene(name="room", decals=tags), [mast], seed=seed)
             ending.callback(world.close)
             camera = world.robots["mast"].cameras[0]
             seen = camera.look(0).colours

@@ -9,7 +9,7 @@ from tests.drawing import needs_opengl
 from tests.perception.tags.conftest import Photo, before_camera, error_of
 from twin.perception.tags.detector import TagDetector, TagDetectorConfig
 from twin.perception.tags.families import FAMILIES, modules, picture
-from twin.sim.scene import Tag
+from twin.sim.looks.tags import tag_decal
 
 LENS = "<distortion><k1>-0.25</k1><k2>0.1</k2><k3>0.01</k3><p1>0.002</p1><p2>-0.001</p2></distortion>"
 DETECTOR = TagDetector(TagDetectorConfig(size=0.16))
@@ -22,7 +22,7 @@ def errors(photo: Photo, tilts: tuple[float, float], views: int, inside: str = "
         tilt = np.radians(draw.uniform(*tilts))
         pose = before_camera(2.0, tilt, *draw.uniform(-np.pi, np.pi, 2), draw.uniform(-0.3, 0.3))
         number = int(draw.integers(587))
-        tag = Tag(name="tag", family="tag36h11", number=number, size=0.16, T_world_tag=pose)
+        tag = tag_decal(name="tag", family="tag36h11", number=number, size=0.16, T_world_tag=pose)
         image, lens = photo(tag, seed=view, inside=inside)
         (sight,) = DETECTOR.detect(image, lens.matrix, np.array(lens.distortion))
         assert (sight.number, sight.hamming) == (number, 0)
@@ -50,11 +50,11 @@ def test_a_tag_seen_from_straight_ahead_has_the_right_distance(photo: Photo) -> 
 @pytest.mark.parametrize("family", ["tag16h5", "tag25h9", "tag36h10", "DICT_4X4_50", "DICT_7X7_1000"])
 def test_every_family_is_read_the_same_way_up(photo: Photo, family: str) -> None:
     pose = before_camera(1.0, 0.5, 0.3, 0.9)
-    tag = Tag(name="tag", family=family, number=FAMILIES[family].count - 1, size=0.2, T_world_tag=pose)
+    tag = tag_decal(name="tag", family=family, number=FAMILIES[family].total - 1, size=0.2, T_world_tag=pose)
     image, lens = photo(tag)
     detector = TagDetector(TagDetectorConfig(family=family, size=0.2))  # type: ignore[arg-type]
     (sight,) = detector.detect(image, lens.matrix, np.zeros(5))
-    assert sight.number == FAMILIES[family].count - 1
+    assert sight.number == FAMILIES[family].total - 1
     assert error_of(sight.T_camera_tag, pose) < (0.003, 1.0)
 
 
@@ -62,7 +62,7 @@ def test_every_family_is_read_the_same_way_up(photo: Photo, family: str) -> None
 def test_each_tag_has_its_size_and_the_order_is_that_of_ids(photo: Photo) -> None:
     poses = [before_camera(1.5, 0.4, 0.0, 0.0, aside) for aside in (-0.2, 0.2)]
     tags = [
-        Tag(name=str(number), family="tag36h11", number=number, size=size, T_world_tag=pose)
+        tag_decal(name=str(number), family="tag36h11", number=number, size=size, T_world_tag=pose)
         for number, size, pose in ((9, 0.2, poses[0]), (4, 0.1, poses[1]))
     ]
     image, lens = photo(*tags)

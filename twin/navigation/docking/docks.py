@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Annotated, Literal
 
 from twin.errors import nearest
-from twin.geometry import Pose2
+from twin.geometry import Pose2, Pose3
 from twin.parameters import Amperes, Flat, Interval, Le, Metres, NotNegative, Positive, Radians, Seconds
 
 Detection = Literal["none", "face", "box"]
@@ -39,6 +39,12 @@ class DockType:
     """The same to the left."""
     external_detection_rotation_yaw: Turn = 0.0
     """The same as a rotation."""
+    external_detection_rotation_pitch: Turn = math.pi / 2.0
+    """Of the detected pose, too: its z comes out of the dock, as that of a tag ..."""
+    external_detection_rotation_roll: Turn = -math.pi / 2.0
+    """... and y up; both 0 for a pose whose x points into the dock."""
+    filter_coef: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.1
+    """Weight of each new pose on `detected_dock_pose` against those before."""
     staging_x_offset: Annotated[Metres, Interval(ge=-10.0, lt=0.0)] = -0.75
     """From the docked pose to the staging pose, along x; negative: before the dock. Nav2: -0.7."""
     staging_yaw_offset: Turn = 0.0
@@ -49,6 +55,11 @@ class DockType:
     """Whether `battery_state` tells that a charger charges, else being docked does; Nav2: true."""
     charging_threshold: Annotated[Amperes, NotNegative] = 0.5
     """A larger current is charging."""
+
+    def detected(self, pose: Pose3) -> Pose2:
+        """Return a pose of `detected_dock_pose` on the floor, x into the dock, but for the yaw offset."""
+        turned = (self.external_detection_rotation_roll, self.external_detection_rotation_pitch, 0.0)
+        return (pose @ Pose3.from_xyz_rpy(rpy=turned)).to_pose2()
 
     @property
     def T_detected_docked(self) -> Pose2:

@@ -160,7 +160,7 @@ class TagDetector:
         # OpenCV does not find turns of half a turn: so the corner that looks like the top left one is it, and
         # y goes down.
         first = int(np.argmin(rays.sum(axis=1)))
-        square = np.column_stack((_PRINT[::-1], np.zeros(4))) * size / 2.0
+        square = np.hstack((_PRINT[::-1] * size / 2.0, np.zeros((4, 1))))
         seen = np.roll(rays, -first, axis=0)[::-1].copy()
         poses = cv2.solvePnPGeneric(square, seen, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
         best = None

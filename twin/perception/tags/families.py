@@ -28,7 +28,7 @@ class Family(NamedTuple):
     """OpenCV's name of it."""
     side: int
     """Modules along each side, without the border."""
-    count: int
+    total: int
     """Ids are below this."""
     half_turns: int = 0
     """How the family's authors turn what OpenCV draws: it has AprilTags upside down."""

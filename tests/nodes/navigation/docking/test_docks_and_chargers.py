@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.nodes.conftest import TICK_NS, Bench
@@ -16,18 +18,20 @@ from twin.bridge.action_types import (
     UndockRobot,
 )
 from twin.bridge.actions import ActionServer, GoalHandle
-from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.conversions import pose2_from_pose, pose_from_pose3
 from twin.bridge.msgs import (
     BatteryState,
     GoalStatus,
     PoseStamped,
+    header,
     new,
 )
-from twin.geometry import Pose2
+from twin.geometry import Pose2, Pose3
 from twin.navigation.docking.docks import Dock as DockEntry
 from twin.navigation.docking.docks import DockDatabase, DockType
 from twin.nodes.messages import pose_stamped
 from twin.nodes.navigation.docking.config import DockingServerConfig
+from twin.sim.looks.tags import T_TAG_PRINT
 
 CHARGER = DockType(is_charger=True, face_width=0.6)
 
@@ -140,7 +144,8 @@ def test_a_battery_that_is_charged_tells_that_it_docked(bench: Bench) -> None:
 
 @pytest.mark.parametrize("lost", [False, True])
 def test_a_detector_of_somebody_else_tells_where_the_dock_is(bench: Bench, lost: bool) -> None:
-    charger = Charger(bench, DockType(use_external_detection_pose=True))
+    into_the_dock = {"external_detection_rotation_pitch": 0.0, "external_detection_rotation_roll": 0.0}
+    charger = Charger(bench, DockType(use_external_detection_pose=True, **into_the_dock))
     at = Pose2(2.0, 0.03, 0.0)
 
     def detect() -> None:
@@ -154,3 +159,19 @@ def test_a_detector_of_somebody_else_tells_where_the_dock_is(bench: Bench, lost:
         assert (goal.result.error_code, goal.result.num_retries) == (904, 1)
     else:
         assert charger.robot.pose == pytest.approx((1.45, 0.03, 0.0), abs=0.015)
+
+
+def test_the_tag_of_a_dock_is_stood_before_as_nav2_has_it(bench: Bench) -> None:
+    charger = Charger(bench, DockType(use_external_detection_pose=True))
+    # x to the right of the print, y up, z out of the dock, as apriltag_ros has the frame of a tag
+    face = Pose3.from_xyz_rpy((2.0, 0.03, 0.4), (0.0, 0.0, math.pi)) @ T_TAG_PRINT
+    noise = np.random.default_rng(3)
+
+    def detect() -> None:
+        wrong = Pose3.from_xyz_rpy(noise.normal(0.0, 0.02, 3), (0.0, 0.0, 0.0))
+        stamp = header(bench.clock.now_ns - TICK_NS, "map")
+        charger.detector.publish(PoseStamped(header=stamp, pose=pose_from_pose3(wrong @ face)))
+
+    bench.each_tick.append(detect)
+    assert charger.dock_by_id().result.success
+    assert charger.robot.pose == pytest.approx((1.45, 0.03, 0.0), abs=0.02), "noise is filtered"

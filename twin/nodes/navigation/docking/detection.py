@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-from twin.bridge.conversions import pose2_from_pose
+from twin.bridge.conversions import pose2_from_pose, pose3_from_pose
 from twin.bridge.msgs import LaserScan, PoseArray, PoseStamped, ns
 from twin.bridge.node import Node
 from twin.bridge.qos import SENSOR_DATA
-from twin.geometry import Pose2
+from twin.bridge.tf import TransformError
+from twin.geometry import Pose2, wrap_angle
 from twin.navigation.docking.config import DockEstimateConfig
 from twin.navigation.docking.dock_estimate import DockEstimate
 from twin.navigation.docking.docks import DockType
@@ -27,17 +28,17 @@ class DockDetection:
         self._expected = Pose2(0.0, 0.0, 0.0)
         self._estimate: DockEstimate | None = None
         self._scans = ScanInput(robot_pose, node.now_ns)
-        self._told: PoseStamped | None = None
-        """The latest on `detected_dock_pose`."""
+        self._told: tuple[Pose2, int] | None = None
+        """What `detected_dock_pose` says, in the odom frame, and the latest stamp of it [ns]."""
         node.create_subscription(
             LaserScan, "scan", robot_pose.placed(self._on_scan), SENSOR_DATA, frozen=True
         )
         node.create_subscription(PoseArray, boxes, robot_pose.placed(self._on_boxes), 10)
-        node.create_subscription(PoseStamped, "detected_dock_pose", self._on_detected, 1)
+        node.create_subscription(PoseStamped, "detected_dock_pose", robot_pose.placed(self._on_detected), 1)
 
     def begin(self, docked: Pose2, type_: DockType) -> None:
         """Look for the dock at which the base would stand at `docked`, in the odom frame."""
-        self._type, self._expected = type_, docked
+        self._type, self._expected, self._told = type_, docked, None
         self._estimate, self._scans = None, ScanInput(self._robot_pose, self._node.now_ns)
         if type_.detection != "none" and not type_.use_external_detection_pose:
             face = docked @ type_.T_detected_docked.inverse()
@@ -66,17 +67,28 @@ class DockDetection:
         return "box" if self._estimate.seen_face and self._type.detection == "box" else "face of the dock"
 
     def _from_topic(self) -> Pose2 | None:
-        told = self._told
-        if told is None:
+        if self._told is None:
             return None
-        age = (self._node.now_ns - ns(told.header.stamp)) * 1e-9
-        frame = self._robot_pose.at_stamp(self._robot_pose.frames.odom, told.header)
-        if age > self._type.external_detection_timeout or frame is None:
-            return None
-        return frame @ pose2_from_pose(told.pose) @ self._type.T_detected_docked
+        seen, stamp_ns = self._told
+        return seen @ self._type.T_detected_docked if self._is_fresh(stamp_ns) else None
+
+    def _is_fresh(self, stamp_ns: int) -> bool:
+        return (self._node.now_ns - stamp_ns) * 1e-9 <= self._type.external_detection_timeout
 
     def _on_detected(self, message: PoseStamped) -> None:
-        self._told = message
+        if not self._type.use_external_detection_pose:
+            return
+        stamp_ns, frames = ns(message.header.stamp), self._robot_pose.frames
+        try:
+            frame = self._robot_pose.buffer.lookup(frames.odom, message.header.frame_id, stamp_ns)
+        except TransformError:
+            return
+        seen = self._type.detected(frame @ pose3_from_pose(message.pose))
+        if self._told is not None and self._is_fresh(self._told[1]):
+            before, share = self._told[0], self._type.filter_coef
+            x, y = before.x + share * (seen.x - before.x), before.y + share * (seen.y - before.y)
+            seen = Pose2(x, y, before.yaw + share * wrap_angle(seen.yaw - before.yaw))
+        self._told = seen, stamp_ns
 
     def _on_scan(self, message: LaserScan) -> None:
         if self._estimate is None or not self._scans.accept(message, self._node.now_ns):

@@ -37,8 +37,6 @@ _TYPO = 0.85
 _ONLY_NAV2S = (
     "analytic_expansion_max_cost",
     "critics",
-    "external_detection_rotation_pitch",
-    "external_detection_rotation_roll",
     "fine_xy_goal_tolerance",
     "max_angular_decel",
     "max_angular_vel",
