@@ -246,13 +246,14 @@ def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) 
     movable = [o for o in obstacles if isinstance(o, FreeBody)]
     placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
     if arena is None:
-        return Scene(name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed)
+        things = {"statics": tuple(statics), "goods": tuple(movable), "placed": placed}
+        return Scene(name=scenario.name, shadows=scenario.world.shadows, **things)
     carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
     totes = (task.tote for mission in carriers for task in mission.tasks)
     given = {good.name: good.properties for good in scenario.world.goods}
     scene = arena.scene({*given, *totes}, seed=scenario.seed, obstacles=statics)
     goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]
-    return replace(scene, goods=(*goods, *movable), placed=placed)
+    return replace(scene, goods=(*goods, *movable), placed=placed, shadows=scenario.world.shadows)
 
 
 def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeBody | PlacedBody:

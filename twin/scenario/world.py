@@ -74,6 +74,8 @@ class WorldConfig(StrictModel):
     """Boxes added to the arena, on no map."""
     goods: tuple[GoodOverride, ...] = ()
     """Goods that differ from the arena's."""
+    shadows: bool = False
+    """Cameras see shadows, which [takes longer](cameras.md#what-it-costs); all else stays as it is."""
 
 
 class PhysicsConfig(StrictModel):
