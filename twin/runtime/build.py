@@ -246,8 +246,13 @@ def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) 
     movable = [o for o in obstacles if isinstance(o, FreeBody)]
     placed = tuple(o for o in obstacles if isinstance(o, PlacedBody))
     if arena is None:
-        things = {"statics": tuple(statics), "goods": tuple(movable), "placed": placed}
-        return Scene(name=scenario.name, shadows=scenario.world.shadows, **things)
+        return Scene(
+            name=scenario.name,
+            statics=tuple(statics),
+            goods=tuple(movable),
+            placed=placed,
+            shadows=scenario.world.shadows,
+        )
     carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
     totes = (task.tote for mission in carriers for task in mission.tasks)
     given = {good.name: good.properties for good in scenario.world.goods}
