@@ -24,6 +24,7 @@ from twin.geometry import Pose2, Pose3, wxyz_from_xyzw
 from twin.models.shapes import Box, Capsule, Cylinder, Sphere
 from twin.recording.read_back import Recording
 from twin.recording.sink import RecordingConfig, RerunSink
+from twin.sim.scene import Scene
 
 ROS = get_typestore(Stores.ROS2_JAZZY)
 NS = 1_000_000_000
@@ -83,6 +84,7 @@ class FakeShape:
     T_body_geometry: Pose3 = field(default_factory=Pose3.from_xyz_rpy)
     rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
     static: bool = False
+    material: str = ""
 
 
 def box(body: str, size: tuple[float, float, float], at: Any = (0, 0, 0), **more: Any) -> FakeShape:
@@ -157,6 +159,7 @@ class FakeWorld:
         self._shapes += [box(f"crate_{i}", (0.3, 0.3, 0.2), rgba=WOOD) for i in range(crates)]
         self._at = [Pose3.from_xyz_rpy((8.5, -5 + 0.5 * i, 0.1)) for i in range(crates)]
         self.time_ns = 0
+        self.scene = Scene(name="hall")
 
     def shapes(self) -> list[FakeShape]:
         return self._shapes

@@ -13,7 +13,11 @@ import pytest
 from twin.errors import RecordingError
 from twin.geometry import xyzw_from_wxyz
 from twin.recording.read_back import Recording, read
+from twin.recording.shapes import rgba8
 from twin.recording.sink import RerunSink
+from twin.sim.world import World
+from twin.warehouse.arena import load as load_arena
+from twin.warehouse.arena_scene import PALETTE
 
 
 @pytest.fixture(scope="session")
@@ -257,3 +261,25 @@ def test_asking_for_what_is_not_there(content: Recording) -> None:
         content.column("/ros/scam", "Points3D:positions")
     with pytest.raises(RecordingError, match="no component"):
         content.column("/ros/scan", "Points2D:positions")
+
+
+def test_surfaces_and_decals_have_textures(tmp_path: Any) -> None:
+    """Of scenery that has a material with one, each once, tinted by the colours of its shapes."""
+    scene = load_arena("warehouse").scene()
+    world = World.compose(scene, [])
+    sink = RerunSink(tmp_path / "looks.rrd")
+    sink.declare(world)
+    sink.close()
+    content = read(tmp_path / "looks.rrd")
+    surfaces = {entity for entity in content.entities if entity.startswith("/world/surfaces/")}
+    assert surfaces == {f"/world/surfaces/{name}" for name in ("plaster", "wood", "cardboard", "board")}
+    decals = {entity for entity in content.entities if entity.startswith("/world/decals/")}
+    assert len(decals) == len(scene.decals) > 6
+    for entity in surfaces | decals:
+        told = content.columns[entity]
+        assert "Mesh3D:albedo_texture_buffer" in told, entity
+        corners = told["Mesh3D:vertex_positions"].values[0]
+        assert len(corners) == len(told["Mesh3D:vertex_texcoords"].values[0]), entity
+        assert told["CoordinateFrame:frame"].values == [["world"]], entity
+    wood = content.columns["/world/surfaces/wood"]["Mesh3D:vertex_colors"].values[0]
+    assert set(wood) == {int.from_bytes(rgba8(PALETTE["wood"]))}

@@ -249,14 +249,25 @@ def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) 
     tags = tuple(map(_tag, scenario.world.tags))
     if arena is None:
         return Scene(
-            name=scenario.name, statics=tuple(statics), goods=tuple(movable), placed=placed, decals=tags
+            name=scenario.name,
+            statics=tuple(statics),
+            goods=tuple(movable),
+            placed=placed,
+            decals=tags,
+            shadows=scenario.world.shadows,
         )
     carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
     totes = (task.tote for mission in carriers for task in mission.tasks)
     given = {good.name: good.properties for good in scenario.world.goods}
     scene = arena.scene({*given, *totes}, seed=scenario.seed, obstacles=statics)
     goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]
-    return replace(scene, goods=(*goods, *movable), placed=placed, decals=(*scene.decals, *tags))
+    return replace(
+        scene,
+        goods=(*goods, *movable),
+        placed=placed,
+        decals=(*scene.decals, *tags),
+        shadows=scenario.world.shadows,
+    )
 
 
 def _obstacle(obstacle: Obstacle, *, hidden: bool = False) -> StaticBody | FreeBody | PlacedBody:

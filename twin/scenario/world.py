@@ -115,6 +115,9 @@ class WorldConfig(StrictModel):
             if title in titles[:i]:
                 yield Fault(("tags", i), f"there is a tag '{title}' before; give this one a name of its own")
 
+    shadows: bool = False
+    """Cameras see shadows, which [takes longer](cameras.md#what-it-costs); all else stays as it is."""
+
 
 class PhysicsConfig(StrictModel):
     """Rates of the simulation."""

@@ -107,3 +107,5 @@ class Scene:
     goods: tuple[FreeBody, ...] = ()
     placed: tuple[PlacedBody, ...] = ()
     decals: tuple[Decal, ...] = ()
+    shadows: bool = False
+    """Whether cameras see them."""

@@ -19,14 +19,16 @@ if TYPE_CHECKING:
     from twin.sim.world import World
 
 
+SHADOW_SIZE = 2048
+"""Pixels along the edge of what is drawn from where the light is: in a hall of 20 m, of 1.4 cm each."""
 _NO_COLOURS, _NO_DEPTH = np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32)
 
 
 class Eyes:
     """The same world with what is seen only, and one canvas for the images of all its cameras.
 
-    Without MuJoCo's shadows, reflections and four samples of each pixel: with them an image takes thirty
-    times as long without a graphics card.
+    Without MuJoCo's reflections and four samples of each pixel, and without its shadows unless the scene
+    wants them: with all that an image takes thirty times as long without a graphics card.
     """
 
     def __init__(self, world: World) -> None:
@@ -39,7 +41,8 @@ class Eyes:
         sizes = np.array([camera.source.size for camera in cameras])
         spec = world.spec_to_see()
         spec.visual.global_.offwidth, spec.visual.global_.offheight = map(int, sizes.max(axis=0))
-        spec.visual.quality.offsamples = spec.visual.quality.shadowsize = 0
+        spec.visual.quality.offsamples = 0
+        spec.visual.quality.shadowsize = SHADOW_SIZE if world.scene.shadows else 0
         for number, camera in enumerate(cameras):
             add_camera(spec.body(camera.mount.body), f"camera {number}", camera.spec, camera.source.size)
         self._world, self._model = world, spec.compile()
@@ -47,8 +50,8 @@ class Eyes:
         self._canvas = Canvas(self._model, *map(int, sizes.max(axis=0)))
         self._process = os.getpid()
         self._scene = mujoco.MjvScene(self._model, self._model.ngeom + 100)
-        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self._scene.flags[flag] = 0
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = world.scene.shadows
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
         self._options = mujoco.MjvOption()
         self._options.sitegroup[:] = 0
         self._views = {id(camera): self._view(number) for number, camera in enumerate(cameras)}

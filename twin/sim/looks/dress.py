@@ -133,7 +133,9 @@ def _light(spec: mujoco.MjSpec) -> None:
     head = spec.visual.headlight
     head.ambient, head.diffuse, head.specular = (0.42,) * 3, (0.18,) * 3, (0.05,) * 3
     sun = spec.light("sun")
-    sun.diffuse, sun.specular, sun.dir = (0.48, 0.47, 0.44), (0.35,) * 3, (0.3, 0.45, -1.0)
+    sun.diffuse, sun.specular = (0.48, 0.47, 0.44), (0.35,) * 3
+    # Low above the floor: MuJoCo throws shadows from there as far as the camera's far plane only.
+    sun.pos, sun.dir = (-1.8, -2.7, 6.0), (0.3, 0.45, -1.0)
     spec.worldbody.add_light(
         name="ceiling", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=(7.0, 10.0, 20.0),
         dir=(-0.75, -0.5, -0.55), diffuse=(0.16, 0.17, 0.20), specular=(0.1,) * 3, castshadow=False,
