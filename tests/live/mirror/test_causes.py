@@ -169,6 +169,15 @@ def test_localisation_that_scans_contradict_forbids_a_twin_and_finds_a_robot_tha
         assert story.apart < 0.1
 
 
+def test_a_robot_that_is_carried_away_while_it_stands_is_found() -> None:
+    story = Story("[{kidnapping: {at: 3 s, to: {x: -6, y: 2, yaw: 150 deg}}}]", drives=False)
+    with story.mirror:
+        story.go_on(13.0)
+        assert story.apart < 0.1
+    (found,) = story.happened
+    assert found.resets == 1
+
+
 def test_a_robot_whose_clock_was_set_back_is_missed_when_it_falls_silent() -> None:
     story = Story()
     with story.mirror:
