@@ -85,6 +85,18 @@ def test_localisation_that_finds_it_here_and_there_puts_it_elsewhere_once() -> N
     assert pair.apart[0] < 1e-3
 
 
+def test_what_is_doubted_or_comes_after_a_silence_is_not_settled() -> None:
+    follower, here = Follower(), Pose2(0.0, 0.0, 0.0)
+    for tick in range(1000):
+        follower.note(tick * TICK_NS, here)
+        if tick < 10 or tick >= 400:
+            follower.measured(
+                tick * TICK_NS, here if tick < 10 else Pose2(5.0, 0.0, 0.0), is_doubted=tick < 700
+            )
+        follower.step(here, 0.02)
+        assert follower.resets == 0 or tick >= 799
+
+
 def test_a_virtual_robot_that_is_left_behind_does_not_wait() -> None:
     pair = Pair(Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), scale=4.0)
     pair.drive(300)
