@@ -120,7 +120,8 @@ class CloudOdometry:
         if dt <= 0.0:
             return None
         if len(seen) < _FEWEST_POINTS:
-            return self._miss(None)
+            self._miss(None)
+            return None
         if self._key is None:
             return self._first(self._thinned(seen, last_s, self._velocity), stamp_s, last_s)
         velocity, guess = self._velocity, self._pose @ _matrix(_moved(self._velocity, dt))
@@ -137,7 +138,8 @@ class CloudOdometry:
                 rotation_epsilon=1e-4,
             )
             if found.num_inliers < max(_FEWEST_POINTS, self.config.min_overlap * cloud.size()):
-                return self._miss(cloud)
+                self._miss(cloud)
+                return None
             taken, guess = velocity, np.asarray(found.T_target_source)
             velocity = _velocity(np.linalg.inv(self._pose) @ guess, dt)
         # By how much the velocity was not what it was taken for, the points are still bent.

@@ -14,15 +14,12 @@ from twin.strict_yaml.later import found, later
 _AMCL, _EKF, _SLAM = (
     f"twin.scenario.estimators.{name.lower()}:{name}Parameters" for name in ("Amcl", "Ekf", "Slam")
 )
-_CLOUDS = "twin.scenario.estimators.lidar_odometry:LidarOdometryParameters"
 if TYPE_CHECKING:
     from twin.scenario.estimators.amcl import AmclParameters
     from twin.scenario.estimators.ekf import EkfParameters
-    from twin.scenario.estimators.lidar_odometry import LidarOdometryParameters as LidarOdometry
     from twin.scenario.estimators.slam import SlamParameters
 else:
     AmclParameters, EkfParameters, SlamParameters = map(later, (_AMCL, _EKF, _SLAM))
-    LidarOdometry = later(_CLOUDS)
 
 
 def _untouched(group: str) -> Any:

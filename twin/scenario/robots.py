@@ -9,16 +9,18 @@ from twin.models.catalogue import catalogue
 from twin.parameters import NotNegative, Seconds
 from twin.scenario.detectors import DetectorEntry
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, faultless, known
-from twin.scenario.localisation import LidarOdometry, Localisation, Odometry, WheelOdometry
+from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
 from twin.strict_yaml import Fault, StrictModel
 from twin.strict_yaml.later import later
 
 if TYPE_CHECKING:
     from twin.scenario.apriltag import AprilTagParameters
+    from twin.scenario.estimators.lidar_odometry import LidarOdometryParameters
     from twin.scenario.navigation import NavigationConfig
-else:  # most robots of small scenarios have neither, and it is as much as all the rest
+else:  # most robots of small scenarios have none, and it is as much as all the rest
     NavigationConfig = later("twin.scenario.navigation:NavigationConfig")
     AprilTagParameters = later("twin.scenario.apriltag:AprilTagParameters")
+    LidarOdometryParameters = later("twin.scenario.estimators.lidar_odometry:LidarOdometryParameters")
 
 
 class RobotConfig(StrictModel):
@@ -40,7 +42,7 @@ class RobotConfig(StrictModel):
     """Between a command to its motors and their start [s]; a whole number of control periods."""
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
-    lidar_odometry: LidarOdometry | None = None
+    lidar_odometry: LidarOdometryParameters | None = None
     """Odometry from the clouds of a lidar with layers; absent: none, `{}`: all defaults."""
     localisation: Localisation | None = None
     """Who estimates its pose; absent: nobody."""

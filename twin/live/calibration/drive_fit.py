@@ -144,7 +144,7 @@ class _Near:
         step = -covariance @ pull
         deviance = error @ error + pull @ step + 2.0 * np.log(factor[0]).sum()
         likelihood = -(deviance + np.linalg.slogdet(information)[1]) / 2.0
-        return _Given(step, covariance, float(likelihood), white)
+        return _Given(step, np.asarray(covariance, np.float64), float(likelihood), white)
 
     def likelihood(self, logs: Array) -> float:
         """Return that of `given`; minus infinity where no errors can be like that."""
@@ -161,7 +161,7 @@ def _averaged(near: _Near, logs: Array) -> tuple[Array, Array]:
     enough to matter. Of its order of magnitude nothing is known before. Draws are those of Metropolis and
     others, Journal of Chemical Physics 21 (1953), one size at a time.
     """
-    rng = np.random.default_rng(0)
+    rng = np.random.Generator(np.random.Philox(0))
     step, covariance, likelihood, _ = near.given(logs)
     drawn = []
     for draw in range(_DRAWS):
