@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from itertools import pairwise
+from pathlib import Path
 from string import ascii_uppercase
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.files.kept import hash_of
 from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box, Cylinder
+from twin.sim.looks import materials
+from twin.sim.looks.kept_pictures import kept_picture
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import Decal, FreeBody, Rgba, Shape, StaticBody
 from twin.warehouse.arena_file import CylindersEntry, PartitionEntry, RackEntry, ToteKind
@@ -101,12 +105,11 @@ def decals(arena: Arena) -> Iterator[Decal]:
     """Yield what is painted on the floor, and a sign with a number on each bay of a rack, front and back."""
     if arena.file.hall.walls:
         hall = arena.hall
-        racks, zones = tuple(arena.racks.values()), tuple(arena.zones.values())
         yield Decal(
             name="floor",
             size=(hall.size_x, hall.size_y),
             T_body_decal=Pose3.from_xyz_rpy((hall.centre.x, hall.centre.y, _STUCK)),
-            paint=partial(_floor, hall, zones, racks, arena.structure),
+            paint=partial(_floor, arena),
         )
     for letter, (name, entry) in zip(ascii_uppercase, arena.file.racks.items(), strict=False):
         bays = max(1, round(entry.length / entry.bay))
@@ -126,16 +129,31 @@ def decals(arena: Arena) -> Iterator[Decal]:
                 )
 
 
-def _floor(*seen: Any) -> NDArray[np.uint8]:
-    from twin.warehouse.floor_paint import floor  # only who draws needs fonts
+def _floor(arena: Arena) -> NDArray[np.uint8]:
+    def paint() -> NDArray[np.uint8]:
+        from twin.warehouse.floor_paint import floor
 
-    return floor(*seen)
+        return floor(arena.hall, tuple(arena.zones.values()), tuple(arena.racks.values()), arena.structure)
+
+    return kept_picture(f"{_painters()} {arena.file.model_dump_json()}", paint)
 
 
 def _sign(words: str) -> NDArray[np.uint8]:
-    from twin.warehouse.floor_paint import sign
+    def paint() -> NDArray[np.uint8]:
+        from twin.warehouse.floor_paint import sign
 
-    return sign(words)
+        return sign(words)
+
+    return kept_picture(f"{_painters()} sign {words}", paint)
+
+
+@cache
+def _painters() -> str:
+    """Return what tells one version of the painters from another, without loading what they need."""
+    here = Path(__file__)
+    return " ".join(
+        str(hash_of(file)) for file in (here, here.with_name("floor_paint.py"), materials.__file__)
+    )
 
 
 @lru_cache(maxsize=8)

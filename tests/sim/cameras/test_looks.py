@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -15,6 +16,7 @@ from twin.models.shapes import Box
 from twin.sim.cameras.camera import View
 from twin.sim.canvas import Canvas
 from twin.sim.looks.dress import dressed
+from twin.sim.looks.kept_pictures import kept_picture
 from twin.sim.physics import Physics
 from twin.sim.scene import Decal, Scene, Shape, StaticBody
 from twin.sim.world import World
@@ -132,3 +134,32 @@ def test_zones_are_painted_where_the_arena_has_them(floor: NDArray[np.uint8]) ->
     lane = yellow & (np.abs(y - rack.y + 0.56) < 0.06) & (np.abs(x - rack.x) < 3.0)
     assert lane.sum() > 80
     assert not yellow[(np.abs(x) < 4.0) & (np.abs(y - 2.1) < 0.6)].any()  # an aisle is free of paint
+
+
+def test_a_picture_is_painted_once_until_what_was_kept_of_it_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TWIN_CACHE", str(tmp_path))
+    painted: list[int] = []
+
+    def paint() -> NDArray[np.uint8]:
+        painted.append(1)
+        return QUARTERS
+
+    for _ in range(2):
+        assert (kept_picture("quarters", paint) == QUARTERS).all()
+    assert len(painted) == 1
+    (file,) = (tmp_path / "pictures").iterdir()
+    for broken in ("", "[]", '{"shape": [9, 9, 3], "zlib": "eJwDAAAAAAE="}', '{"shape": [2], "zlib": "abc"}'):
+        file.write_text(broken)
+        assert (kept_picture("quarters", paint) == QUARTERS).all(), broken
+    assert len(painted) == 5
+
+
+def test_scenery_that_is_drawn_has_no_part_in_physics() -> None:
+    """Mass, shapes and pairs that may touch are those of a world without pictures and tags."""
+    scene = load("warehouse").scene(set(), seed=1)
+    plain = World.compose(replace(scene, decals=()), ())
+    seen = World.compose(replace(scene, decals=(*scene.decals, decal())), ())
+    assert plain.model.body_mass.sum() == seen.model.body_mass.sum()
+    assert mujoco.mj_sizeModel(plain.model) == mujoco.mj_sizeModel(seen.model)

@@ -9,9 +9,10 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import zoom
 
+from twin.files.kept import hash_of
 from twin.geometry import Array
+from twin.sim.looks.kept_pictures import kept_picture
 from twin.sim.noise import NoiseStream
 
 TEXELS = 128
@@ -20,6 +21,8 @@ TEXELS = 128
 
 def smooth_noise(name: str, rows: int, columns: int, height: int, width: int) -> Array:
     """Return noise from -1 to 1 with so many bumps down and across, shape (height, width), without a seam."""
+    from scipy.ndimage import zoom  # only who paints needs it, and it takes as long as all textures
+
     grid = NoiseStream(0, f"texture/{name}").uniform(0, rows * columns).reshape(rows, columns) * 2.0 - 1.0
     return zoom(grid, (height / rows, width / columns), order=1, mode="grid-wrap", grid_mode=True)
 
@@ -93,7 +96,9 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
 def texture(material: str) -> NDArray[np.uint8] | None:
     """Return the texture of a material, shape (`TEXELS`, `TEXELS`, 3); None: it has none."""
     make = MATERIALS[material].texture
-    return None if make is None else as_bytes(make())
+    if make is None:
+        return None
+    return kept_picture(f"{hash_of(__file__)} {material}", lambda: as_bytes(make()))
 
 
 def as_bytes(values: Array) -> NDArray[np.uint8]:
