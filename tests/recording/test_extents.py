@@ -15,12 +15,14 @@ from twin.recording.blueprint import layout
 from twin.recording.extents import RobotBox, Stage, bounds, robot_box
 from twin.recording.read_back import Recording, read
 from twin.recording.sink import RerunSink
+from twin.sim.scene import Scene
 
 
 class Leaving:
     """A bare floor, and a robot that drives off along y at 2 m/s."""
 
     body_names = ("robot/base_link",)
+    scene = Scene(name="floor")
 
     def __init__(self, shape: Any, edge: float = 0.5) -> None:
         self.time_ns = 0

@@ -50,14 +50,14 @@ class ObservationSource:
     def __post_init__(self) -> None:
         if not self.topic.strip("/"):
             raise ValueError("topic must name a topic")
-        for low, high in (
-            ("min_obstacle_height", "max_obstacle_height"),
-            ("obstacle_min_range", "obstacle_max_range"),
-            ("raytrace_min_range", "raytrace_max_range"),
-        ):
-            least, most = getattr(self, low), getattr(self, high)
-            if least > most:
-                raise ValueError(f"{low} is {least:g}, more than {high}, {most:g}")
+        for use, of in (("obstacle", "height"), ("obstacle", "range"), ("raytrace", "range")):
+            low, high = (
+                (f"{end}_{use}_{of}" if of == "height" else f"{use}_{end}_{of}") for end in ("min", "max")
+            )
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(
+                    f"{low} is {getattr(self, low):g}, more than {high}, {getattr(self, high):g}"
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
