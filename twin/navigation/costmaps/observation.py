@@ -50,10 +50,8 @@ class ObservationSource:
     def __post_init__(self) -> None:
         if not self.topic.strip("/"):
             raise ValueError("topic must name a topic")
-        for use, of in (("obstacle", "height"), ("obstacle", "range"), ("raytrace", "range")):
-            low, high = (
-                (f"{end}_{use}_{of}" if of == "height" else f"{use}_{end}_{of}") for end in ("min", "max")
-            )
+        for limit in ("{}_obstacle_height", "obstacle_{}_range", "raytrace_{}_range"):
+            low, high = limit.format("min"), limit.format("max")
             if getattr(self, low) > getattr(self, high):
                 raise ValueError(
                     f"{low} is {getattr(self, low):g}, more than {high}, {getattr(self, high):g}"

@@ -116,7 +116,7 @@ def _lasers(file: Nav2Parameters, node: str, layer: str, sources: Sequence[str])
     """Return the topics of those sources of a layer that are laser scans (Nav2's default: point clouds)."""
     values, found = file.values(node), []
     for source in sources:
-        topic, type_ = (f"{layer}.{source}.{key}" for key in ("topic", "data_type"))
+        topic, type_ = f"{layer}.{source}.topic", f"{layer}.{source}.data_type"
         if values.get(type_) == "LaserScan":
             found.append(file.relative(str(values.get(topic, source))))
             file.understood(node, f"{layer}.observation_sources", topic, type_)

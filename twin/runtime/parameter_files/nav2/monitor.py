@@ -84,7 +84,7 @@ def _read(values: Mapping[str, Any]) -> Iterator[str]:
         if values.get(f"{name}.type", "scan") in _SENSORS:
             yield from (f"{name}.{key}" for key in _SENSOR)
         if values.get(f"{name}.type") == "pointcloud":
-            yield from (f"{name}.{key}" for key in ("min_height", "max_height"))
+            yield from (f"{name}.{one.name}" for one in fields_of(MonitorCloud).values())
 
 
 def _topics(file: Nav2Parameters, values: Mapping[str, Any], type_: str) -> tuple[str, ...]:
