@@ -11,6 +11,7 @@ from PIL import Image
 
 from twin.errors import RecordingError
 from twin.recording import player
+from twin.recording.sink import RerunSink
 
 needs_vulkan = pytest.mark.skipif(
     not player.has_vulkan(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"
@@ -46,6 +47,35 @@ def test_a_view_that_is_not_there_is_told_of(recorded: Any, tmp_path: Path) -> N
     with pytest.raises(RecordingError, match=r"no view 'Mab' in .*; valid: .*Map"):
         player.screenshot(recorded.path, tmp_path / "shot.png", view="Mab")
     assert not (tmp_path / "shot.png").exists()
+
+
+@needs_vulkan
+@pytest.mark.parametrize(
+    ("opens_m", "shown"), [(0.0, "Localisation error [m, rad]"), (0.04, "Joints [m, rad]")]
+)
+def test_joints_that_stand_still_are_behind_the_error_of_localisation(
+    make_run: Any, tmp_path: Path, opens_m: float, shown: str
+) -> None:
+    """What their encoders make of noise is no plot to begin with."""
+    run, sink = make_run(duration_s=0.0), RerunSink(tmp_path / "a.rrd")
+    sink.declare(run.world, {"robot": ["wheel_left_joint", "wheel_right_joint"]})
+    (samples,) = run.ticks()
+    (states,) = (sample for sample in samples if sample.topic == "/joint_states")
+    for i, place in enumerate((0.0, 1e-4, 1e-4 + opens_m)):
+        states.message.position = np.array([float(i), float(i), 2e-4 * i, place])
+        sink.on_sample(states)
+    sink.close()
+    with player.headless_viewer(tmp_path / "a.rrd") as client:
+        views = {view.name: view.view_id for view in client.get_state().views}
+        plots = (name for name in views if name.startswith(("Joints", "Localisation")))
+        assert [name for name in plots if _is_drawn(client, views[name])] == [shown]
+
+
+def _is_drawn(client: Any, view_id: str) -> bool:
+    try:
+        return bool(client.take_screenshot(view_id))
+    except ConnectionError:  # another tab is before it
+        return False
 
 
 def test_missing_file(tmp_path: Path) -> None:

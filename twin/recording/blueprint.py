@@ -35,6 +35,7 @@ def layout(
     *,
     mirrors: bool = False,
     pictures: Sequence[str] = (),
+    joints_move: bool = True,
 ) -> rrb.Blueprint:
     """Return the screen: 3-D, mission, plots on the left; close-up, map, verdict and log on the right.
 
@@ -45,17 +46,17 @@ def layout(
         mirrors: How far virtual and physical robots are apart comes before the joints, and the status of
             the mirror before the verdict.
         pictures: Entities of what cameras see; each is beside the close-ups.
+        joints_move: Else their plot, which is then of noise, is behind that of the localisation's error.
     """
     names = [box.robot for box in robots]
-    plots = [
-        _plot("Joints [m, rad]", [f"/joints/{name}/**" for name in names], end_ns),
-        _plot("Localisation error [m, rad]", [f"/localisation/{name}/**" for name in names], end_ns),
-    ]
+    joints = _plot("Joints [m, rad]", [f"/joints/{name}/**" for name in names], end_ns)
+    error = _plot("Localisation error [m, rad]", [f"/localisation/{name}/**" for name in names], end_ns)
+    plots = [joints, error] if joints_move else [error, joints]
     texts = [rrb.TextDocumentView(name="Verdict", origin="/verdict"), _log()]
     if mirrors:
         apart = _plot("Divergence [m, rad]", [f"/divergence/{name}/**" for name in names], end_ns)
         # Where the virtual robot is believed to be is no error: it is where the physical one is seen.
-        plots = [apart, plots[0]]
+        plots = [apart, joints]
         texts.insert(0, rrb.TextDocumentView(name="Mirror", origin="/mirror/status"))
     left = rrb.Vertical(
         _whole("Simulation", stage, names),

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LOCALHOST = "127.0.0.1"
 _LOAD_TIMEOUT_S = 60.0
+_NOTES_S = 1.0
+"""Until what the viewer says of itself at its start has gone from the screen."""
 
 
 def play(
@@ -82,6 +84,7 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
             if view not in found:
                 raise RecordingError(f"no view {view!r} in {path}; valid: {', '.join(sorted(found))}")
             view_id = found[view]
+        sleep(_NOTES_S)
         try:
             picture = client.take_screenshot(view_id)
         except ConnectionError as fault:

@@ -252,6 +252,7 @@ class RerunSink:
             return
         from twin.recording.blueprint import layout
         from twin.recording.channels.pictures import PictureChannel
+        from twin.recording.channels.series import JointChannel
         from twin.recording.stream import end_recording, handed_over, log_verdict
 
         self._closed = True
@@ -265,8 +266,16 @@ class RerunSink:
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
             shown = [source.entity for source in self._sources if isinstance(source, PictureChannel)]
-            now_ns = self._world.time_ns
-            blueprint = layout(self._stage, self._robots, now_ns, mirrors=self.mirrors, pictures=shown)
+            blueprint = layout(
+                self._stage,
+                self._robots,
+                self._world.time_ns,
+                mirrors=self.mirrors,
+                pictures=shown,
+                joints_move=any(
+                    isinstance(source, JointChannel) and source.moves for source in self._sources
+                ),
+            )
             with handed_over(blueprint):
                 self._recording.send_blueprint(blueprint)
         finally:

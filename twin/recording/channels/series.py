@@ -22,6 +22,8 @@ COMMANDED_COLOUR = (255, 150, 40, 255)
 MEASURED_COLOUR = (80, 160, 255, 255)
 LOG_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "CRITICAL"}
 """rcl_interfaces/msg/Log to Rerun."""
+_NOISE = 0.005
+"""A joint that never leaves where it began by more does not move [m or rad]."""
 _STATE = Component(rr.StateChange, "state")
 _TEXT, _LEVEL = (Component(rr.TextLog, name) for name in ("text", "level"))
 _DOCUMENT = Component(rr.TextDocument, "text")
@@ -62,6 +64,9 @@ class JointChannel(Channel[tuple[int, tuple[str, ...], Array]]):
         super().__init__(context, namespace, topic)
         self._palette = Palette()
         self._entities: dict[str, str] = {}
+        self._began: dict[str, float] = {}
+        self.moves = False
+        """Whether one of them has moved."""
 
     def take(self, sample: Sample[Any]) -> None:
         """Keep positions [m] or [rad], if there are any."""
@@ -76,6 +81,9 @@ class JointChannel(Channel[tuple[int, tuple[str, ...], Array]]):
             times, _, positions = zip(*group, strict=True)
             columns = zip(names, np.transpose(positions), strict=True)
             series = {self._entity(name): column for name, column in columns if name not in wheels}
+            for entity, column in series.items():
+                began = self._began.setdefault(entity, column[0])
+                self.moves = self.moves or bool(np.abs(column - began).max() > _NOISE)
             yield from scalars(sim_time(times), series)
 
     def _entity(self, name: str) -> str:
