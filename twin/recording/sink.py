@@ -30,6 +30,8 @@ if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays f
 
 _NS = 1_000_000_000
 _PICTURE = "sensor_msgs/msg/CompressedImage"
+_APPLICATION_ID = "twin"
+"""Under which the viewer stores changes to the layout."""
 _CLOUD = "sensor_msgs/msg/PointCloud2"
 _COLLECTING = 0.9
 """Part of what a killed run loses during which rows are collected; in the rest of it they are written."""
@@ -94,26 +96,23 @@ class RerunSink:
 
     def __init__(
         self,
-        target: Path | str | None,
+        target: Path | None,
         *,
         config: RecordingConfig | None = None,
         screen: LiveScreen | None = None,
-        application_id: str = "twin",
         recording_id: str = "run",
     ) -> None:
         """Prepare; the file is created by `declare`.
 
         Args:
-            target: Of the `.rrd` file, whose folder is created; or the address of a viewer, for which the run
-                waits; None if there is but the screen.
+            target: The `.rrd` file, whose folder is created; None if there is but the screen.
             config: What to keep.
             screen: Shows the recording while it is made; the run never waits for it.
-            application_id: Under which the viewer stores changes to the layout.
             recording_id: Fixed by the caller, so that two equal runs write equal recordings.
         """
         self._target = target
         self._config = config or RecordingConfig()
-        self._ids = (application_id, recording_id)
+        self._recording_id = recording_id
         self._screen = screen
         self._world: World | None = None
         self._early: list[Any] = []
@@ -163,7 +162,7 @@ class RerunSink:
         shown = [] if self._images_period is None else [picture_entity(topic) for topic in cameras]
         blueprint = layout(self._stage, self._robots, mirrors=self.mirrors, pictures=shown)
         self._recording: rr.RecordingStream = open_recording(
-            self._target, *self._ids, blueprint, self._screen
+            self._target, _APPLICATION_ID, self._recording_id, blueprint, self._screen
         )
         self._poses: Poses = Poses(
             world.body_names,

@@ -65,13 +65,13 @@ class _Shown(rr.RecordingStream):
 
 
 def open_recording(
-    target: Path | str | None,
+    target: Path | None,
     application_id: str,
     recording_id: str,
     blueprint: rrb.Blueprint,
     screen: LiveScreen | None = None,
 ) -> rr.RecordingStream:
-    """Return a stream into a new file, or to a viewer at an address, and onto a screen.
+    """Return a stream into a new file, and onto a screen.
 
     Nothing in it depends on the wall clock: no `log_time`, no start time; chunks end when the sink flushes.
     It has no footer, an index of all chunks: that would grow in memory for as long as a run goes on.
@@ -79,7 +79,7 @@ def open_recording(
     Raises:
         RecordingError: The file cannot be written, or the screen is not there.
     """
-    if isinstance(target, Path):
+    if target is not None:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.open("wb").close()
@@ -94,10 +94,8 @@ def open_recording(
         recording = shown = without_clock(_Shown, application_id, recording_id)
         shown.screen, shown.keeps = screen, target is not None
     with handed_over(blueprint):
-        if isinstance(target, Path):
+        if target is not None:
             recording.save(target, default_blueprint=blueprint, write_footer=False)
-        elif target is not None:
-            recording.connect_grpc(target, default_blueprint=blueprint)
     return recording
 
 
@@ -146,21 +144,22 @@ def begin_flush(recording: rr.RecordingStream) -> None:
         recording.flush(timeout_sec=0.0)
 
 
-def flush(recording: rr.RecordingStream, target: Path | str | None) -> None:
-    """Wait until everything so far is in the file, or has reached the viewer.
+def flush(recording: rr.RecordingStream, target: Path | None) -> None:
+    """Wait until everything so far is in the file.
 
     A full disk ends Rerun's writer, for which its flush then may wait for ever.
 
     Raises:
         RecordingError: It could not be written.
     """
+    if target is None:
+        return
     for _ in range(FLUSH_TIMEOUT_S):
         try:
             recording.flush(timeout_sec=1.0)
             return
         except RuntimeError as fault:
-            waits = "timed out" in str(fault) and isinstance(target, Path) and _has_room(target.parent)
-            if not waits:
+            if "timed out" not in str(fault) or not _has_room(target.parent):
                 break
     # When it is collected, or the process ends, Rerun would wait for that writer, too.
     _abandoned.append(recording.inner)
@@ -177,7 +176,7 @@ def _has_room(folder: Path) -> bool:
     return True
 
 
-def end_recording(recording: rr.RecordingStream, target: Path | str | None) -> None:
+def end_recording(recording: rr.RecordingStream, target: Path | None) -> None:
     """See that all is in the file, and close it.
 
     A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
@@ -203,10 +202,7 @@ def whole_recording(path: Path) -> Iterator[Path]:
         raise _not_whole(path) from fault
 
 
-def _not_whole(target: Path | str | None) -> RecordingError:
-    if not isinstance(target, Path):
-        return RecordingError(f"the viewer at {target} takes nothing any more; was it closed?")
-    path = target
+def _not_whole(path: Path) -> RecordingError:
     return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")
 
 
