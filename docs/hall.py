@@ -13,23 +13,26 @@ import numpy as np
 from pictures import save
 from PIL import Image
 
-import twin
+from twin.runtime.open_run import OpenRun
+from twin.scenario.schema import load
 from twin.sim.canvas import Canvas
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SIZE, ZOOM, TIME_S = (1000, 560), 2, 44.0
 
 
 def hall(time_s: float) -> Image.Image:
     """Return what a visitor of the warehouse sees at a time [s]."""
-    with twin.Simulation("warehouse") as simulation:
-        simulation.run_until(time_s)
-        world = simulation._running.run.world
-        spec = world.spec_to_see()
-        width, height = ZOOM * SIZE[0], ZOOM * SIZE[1]
-        spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
-        model = spec.compile()
-        data = mujoco.MjData(model)
-        data.qpos[:] = world.data.qpos
+    under_way = OpenRun(load(SCENARIOS / "warehouse.yaml"))
+    world = under_way.run.world
+    under_way.advance(lambda: world.time_ns >= time_s * 1e9)
+    spec = world.spec_to_see()
+    width, height = ZOOM * SIZE[0], ZOOM * SIZE[1]
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = world.data.qpos
+    under_way.close()
     mujoco.mj_forward(model, data)
     view, options = mujoco.MjvCamera(), mujoco.MjvOption()
     x, y, _ = data.body("warehouse_bot/base_link").xpos

@@ -358,6 +358,15 @@ def test_every_robot_has_a_section_with_a_small_picture(robot: str) -> None:
     assert picture.stat().st_size <= 60_000
 
 
+def test_every_scenario_that_ships_has_a_small_picture() -> None:
+    page = PAGES["docs/gallery.md"].read_text("utf-8")
+    for scenario in (ROOT / "scenarios").rglob("*.yaml"):
+        picture = f"gallery/{scenario.stem}.jpg"
+        assert f"\n## {scenario.stem}\n" in page
+        assert f"]({picture})" in page
+        assert (ROOT / "docs" / picture).stat().st_size <= 60_000
+
+
 def test_the_picture_of_the_run_is_small() -> None:
     picture = ROOT / "docs" / "warehouse.png"
     assert picture.stat().st_size < 200_000
