@@ -98,7 +98,7 @@ def tracked() -> list[Path]:
 def texts() -> Iterator[tuple[str, str]]:
     """Yield path and text of every tracked text file but this one."""
     for path in tracked():
-        if path == Path(__file__) or path.suffix in (".npz", ".pcd", ".pgm", ".png"):
+        if path == Path(__file__) or path.suffix in (".npz", ".pcd", ".pgm", ".png", ".jpg"):
             continue
         yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
 

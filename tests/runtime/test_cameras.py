@@ -185,7 +185,7 @@ def test_cameras_that_are_off_offer_nothing(scenario: Load) -> None:
 def test_a_recording_shows_pictures_at_its_own_rate(scenario: Load, tmp_path: Path) -> None:
     run = OpenRun(scenario(text() + "recording: {images_hz: 5}\n"), out=tmp_path)
     run.advance()
-    assert run.run.world.eyes.drawn == 2
+    assert run.run.world.eyes.drawn == 4  # two pictures, and their depths
     run.finish()
     recording = read(tmp_path / "look.rrd")
     entity = "/cameras/camera/image_raw/compressed"
@@ -196,3 +196,5 @@ def test_a_recording_shows_pictures_at_its_own_rate(scenario: Load, tmp_path: Pa
     assert picture.size == (320, 240)
     k = np.asarray(recording.column(entity, "Pinhole:image_from_camera").values[0], float).reshape(3, 3).T
     assert (k[0, 2], k[1, 2]) == (159.5, 119.5)
+    depths = recording.column("/depths/camera/depth/image_raw", "DepthImage:buffer")
+    assert depths.times_ns.tolist() == column.times_ns.tolist()

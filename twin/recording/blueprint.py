@@ -127,7 +127,12 @@ def _screen(left: rrb.Vertical, right: rrb.Vertical) -> rrb.Blueprint:
 
 def _camera_name(entity: str) -> str:
     """Return what a view of pictures is called: their topic without what image_transport adds."""
-    return entity.removeprefix("/cameras/").removesuffix("/compressed").removesuffix("/image_raw")
+    return (
+        entity.removeprefix("/cameras/")
+        .removeprefix("/depths/")
+        .removesuffix("/compressed")
+        .removesuffix("/image_raw")
+    )
 
 
 def _whole(

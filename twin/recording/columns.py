@@ -70,6 +70,14 @@ def send(recording: rr.RecordingStream, chunks: Iterable[Chunk]) -> None:
     )
 
 
+def row_of(archetype: rr.AsComponents) -> list[Column]:
+    """Return all that an archetype says as columns of one row."""
+    batches = archetype.as_component_batches()
+    values = [batch.as_arrow_array() for batch in batches]
+    rows = [pa.ListArray.from_arrays([0, len(value)], value) for value in values]
+    return [Column(batch.component_descriptor(), row) for batch, row in zip(batches, rows, strict=True)]
+
+
 def sim_time(times_ns: ArrayLike) -> Times:
     """Return the index of rows at simulated times [ns], without rounding through seconds."""
     return Times(_numbers(times_ns, np.int64, _DURATION))

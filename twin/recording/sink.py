@@ -135,6 +135,7 @@ class RerunSink:
         world: World,
         wheels: Mapping[str, Collection[str]] = NO_WHEELS,
         cameras: Mapping[str, Mounted] = NO_CAMERAS,
+        depths: Collection[str] = (),
     ) -> None:
         """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
 
@@ -142,12 +143,14 @@ class RerunSink:
             world: At the start.
             wheels: By robot: joints that turn without end, which are not plotted.
             cameras: By topic: what makes the pictures there.
+            depths: Topics of depth images that cameras make.
 
         Raises:
             RecordingError: The file cannot be written, or the screen is not there.
         """
         from twin.recording.blueprint import layout
         from twin.recording.channels.channel import Context
+        from twin.recording.channels.images import depth_entity
         from twin.recording.channels.pictures import picture_entity
         from twin.recording.extents import Stage, robot_box
         from twin.recording.poses import Poses
@@ -159,8 +162,11 @@ class RerunSink:
         frames = Frames(world.body_names)
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
         self._stage: Stage = Stage(world, shapes, self._robots)
-        shown = [] if self._images_period is None else [picture_entity(topic) for topic in cameras]
-        blueprint = layout(self._stage, self._robots, mirrors=self.mirrors, pictures=shown)
+        shown = [*map(picture_entity, cameras), *map(depth_entity, depths)]
+        self._depths = frozenset(depths)
+        blueprint = layout(
+            self._stage, self._robots, mirrors=self.mirrors, pictures=shown if self._images_period else ()
+        )
         self._recording: rr.RecordingStream = open_recording(
             self._target, _APPLICATION_ID, self._recording_id, blueprint, self._screen
         )
@@ -212,11 +218,13 @@ class RerunSink:
         return msgtype in SHOWN_TYPES
 
     def wants(self, publisher: Publisher[Any]) -> bool:
-        """Return whether it shows a cloud, or a picture of a camera that is due (for `Bus.wishes`)."""
+        """Return whether it shows a cloud, or a picture or depths that are due (for `Bus.wishes`)."""
         if publisher.msgtype == _CLOUD:  # a camera shows its own as a picture
             topics = (each for each in publisher.node.endpoints if isinstance(each, type(publisher)))
             return not self._closed and all(each.msgtype != _PICTURE for each in topics)
-        if publisher.msgtype != _PICTURE or self._images_period is None or self._closed:
+        if publisher.msgtype != _PICTURE and publisher.name not in self._depths:
+            return False
+        if self._images_period is None or self._closed:
             return False
         now_ns = publisher.node.now_ns
         if now_ns < self._pictures.get(publisher.name, 0):
@@ -250,6 +258,7 @@ class RerunSink:
         if self._world is None or self._closed:
             return
         from twin.recording.blueprint import layout
+        from twin.recording.channels.images import DepthChannel
         from twin.recording.channels.pictures import PictureChannel
         from twin.recording.channels.series import JointChannel
         from twin.recording.stream import end_recording, handed_over, log_verdict
@@ -265,6 +274,8 @@ class RerunSink:
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
             shown = [source.entity for source in self._sources if isinstance(source, PictureChannel)]
+            depths = (source for source in self._sources if isinstance(source, DepthChannel))
+            shown += [source.entity for source in depths if source.has_images]
             blueprint = layout(
                 self._stage,
                 self._robots,

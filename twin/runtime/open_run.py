@@ -182,7 +182,7 @@ class OpenRun:
             if self._sink is not None:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
-                self._sink.declare(parts.world, wheels, _cameras(parts))
+                self._sink.declare(parts.world, wheels, _cameras(parts), _depths(parts))
             self._pace = kept = Pace(pace) if isinstance(pace, int | float) else pace
             if kept is not None:
                 world = parts.world
@@ -461,6 +461,11 @@ def _recording(scenario: Scenario, out: Path | None, screen: LiveScreen | None) 
         name = f"{name}-{uuid.uuid4()}"  # each is a recording of its own, which the viewer turns to
     config = live if screen is not None else RecordingConfig(**rates)
     return RerunSink(file, config=config, recording_id=name, screen=screen)
+
+
+def _depths(parts: Parts) -> list[str]:
+    """Return the topics of depth images."""
+    return [camera.depths for stack in parts.stacks.values() for camera in stack.cameras if camera.depths]
 
 
 def _cameras(parts: Parts) -> dict[str, Mounted]:

@@ -115,6 +115,11 @@ class CameraPublisher:
         """Absolute name of the topic of its JPEG pictures; empty if it makes none."""
         return self._publishers["jpeg"].name if "jpeg" in self._publishers else ""
 
+    @property
+    def depths(self) -> str:
+        """Absolute name of the topic of its depth images; empty if it makes none."""
+        return self._publishers["depth"].name if "depth" in self._publishers else ""
+
     def publish(self, time_ns: int) -> None:
         """Look at `time_ns`, if anybody wants to see, and publish, stamped with it.
 

@@ -7,6 +7,7 @@ from typing import Any
 from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
 from twin.recording.channels.clouds import CloudChannel
+from twin.recording.channels.images import DepthChannel
 from twin.recording.channels.pictures import PictureChannel
 from twin.recording.channels.series import (
     DocumentChannel,
@@ -36,6 +37,7 @@ _BY_TYPE: dict[str, type[Any]] = {
     "geometry_msgs/msg/PoseArray": PoseArrayChannel,
     "rcl_interfaces/msg/Log": LogChannel,
     "sensor_msgs/msg/CompressedImage": PictureChannel,
+    "sensor_msgs/msg/Image": DepthChannel,
 }
 _BY_NAME: dict[tuple[str, str], type[Any]] = {
     ("cmd_vel", "geometry_msgs/msg/Twist"): VelocityChannel,

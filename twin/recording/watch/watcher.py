@@ -23,12 +23,13 @@ from twin.errors import TwinError, shortened
 from twin.periods import period_of
 from twin.recording.blueprint import graph_layout
 from twin.recording.channels.channel import Channel, Context
+from twin.recording.channels.images import ImageChannel
 from twin.recording.channels.pictures import PictureChannel
 from twin.recording.columns import send
 from twin.recording.extents import Floor
 from twin.recording.map_eye import declare_map_eye
 from twin.recording.stream import begin_flush, declare_up, end_recording, flush, handed_over, open_recording
-from twin.recording.watch.channels import TEXT, ImageChannel, TextChannel, kinds_of
+from twin.recording.watch.channels import TEXT, TextChannel, kinds_of
 from twin.recording.watch.frame_tree import FrameTree, GraphFrames
 from twin.recording.watch.graph_time import GraphTime
 from twin.recording.watch.robots import Robots
