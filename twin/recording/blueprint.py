@@ -35,6 +35,7 @@ def layout(
     *,
     mirrors: bool = False,
     pictures: Sequence[str] = (),
+    flat: Sequence[str] = (),
     joints_move: bool = True,
 ) -> rrb.Blueprint:
     """Return the screen: 3-D, mission, plots on the left; close-up, map, verdict and log on the right.
@@ -46,6 +47,7 @@ def layout(
         mirrors: How far virtual and physical robots are apart comes before the joints, and the status of
             the mirror before the verdict.
         pictures: Entities of what cameras see; each is beside the close-ups.
+        flat: Those of them that have no place in space.
         joints_move: Else their plot, which is then of noise, is behind that of the localisation's error.
     """
     names = [box.robot for box in robots]
@@ -59,7 +61,7 @@ def layout(
         plots = [apart, joints]
         texts.insert(0, rrb.TextDocumentView(name="Mirror", origin="/mirror/status"))
     left = rrb.Vertical(
-        _whole("Simulation", stage, names),
+        _whole("Simulation", stage, names, _RASTERS, flat),
         _mission(names, end_ns),
         rrb.Horizontal(
             rrb.Tabs(
@@ -70,7 +72,7 @@ def layout(
         ),
         row_shares=[5, 1.8, 2.6],
     )
-    right = rrb.Vertical(*_close_ups(robots, pictures), _from_above(names), rrb.Tabs(*texts))
+    right = rrb.Vertical(*_close_ups(robots, pictures, _RASTERS, flat), _from_above(names), rrb.Tabs(*texts))
     return _screen(left, right)
 
 
@@ -79,6 +81,7 @@ def graph_layout(
     names: Sequence[str],
     robots: Sequence[RobotBox],
     pictures: Sequence[str],
+    flat: Sequence[str],
     texts: Mapping[str, str],
 ) -> rrb.Blueprint:
     """Return the screen of a graph: as that of a run, without what only a simulator knows.
@@ -88,10 +91,11 @@ def graph_layout(
         names: Of robots.
         robots: Those that are drawn; each has a close-up.
         pictures: Entities of what cameras see.
+        flat: Those of them that have no place in space.
         texts: Entities of messages to read, and what they are called.
     """
     left = rrb.Vertical(
-        _whole("World", floor, names, _COSTS),
+        _whole("World", floor, names, _COSTS, flat),
         rrb.Horizontal(
             _plot("Forward velocity [m/s]", [f"/velocity/{name}/linear/**" for name in names], None),
             _plot("Turning velocity [rad/s]", [f"/velocity/{name}/angular/**" for name in names], None),
@@ -101,16 +105,16 @@ def graph_layout(
     )
     below: list[Any] = [_log(), _mission(names, None)]
     below += [rrb.TextDocumentView(name=name, origin=entity) for entity, name in texts.items()]
-    right = rrb.Vertical(*_close_ups(robots, pictures, _COSTS), _from_above(names), rrb.Tabs(*below))
+    right = rrb.Vertical(*_close_ups(robots, pictures, _COSTS, flat), _from_above(names), rrb.Tabs(*below))
     return _screen(left, right)
 
 
 def _close_ups(
-    robots: Sequence[RobotBox], pictures: Sequence[str], hidden: Sequence[str] = _RASTERS
+    robots: Sequence[RobotBox], pictures: Sequence[str], hidden: Sequence[str], flat: Sequence[str]
 ) -> list[Any]:
     """Return what is at the top on the right: close-ups, and what cameras see beside them."""
     seen = [rrb.Spatial2DView(name=_camera_name(entity), origin=entity) for entity in pictures]
-    close_ups: list[Any] = [rrb.Tabs(*(_close_up(box, hidden) for box in robots))] if robots else []
+    close_ups: list[Any] = [rrb.Tabs(*(_close_up(box, hidden, flat) for box in robots))] if robots else []
     return [rrb.Horizontal(*close_ups, rrb.Tabs(*seen))] if seen else close_ups
 
 
@@ -136,7 +140,7 @@ def _camera_name(entity: str) -> str:
 
 
 def _whole(
-    name: str, stage: Stage | Floor, robots: Sequence[str], hidden: Sequence[str] = _RASTERS
+    name: str, stage: Stage | Floor, robots: Sequence[str], hidden: Sequence[str], flat: Sequence[str]
 ) -> rrb.Spatial3DView:
     """Return the view of all that happens, seen from the south side, above."""
     centre = (stage.low + stage.high) / 2.0
@@ -144,13 +148,13 @@ def _whole(
     size = float(max(0.85 * width, 1.1 * length, _LEAST_STAGE))  # the view is wider than high
     position = (centre[0] - 0.1 * size, centre[1] - 0.7 * size, 0.52 * size)
     grid = rrb.LineGrid3D(visible=True, spacing=1.0, color=(110, 110, 110, 110))
-    return _world(name, robots, WORLD, grid, orbit(position, (*centre, 0.0)), hidden)
+    return _world(name, robots, WORLD, grid, orbit(position, (*centre, 0.0)), hidden, flat)
 
 
-def _close_up(box: RobotBox, hidden: Sequence[str]) -> rrb.Spatial3DView:
+def _close_up(box: RobotBox, hidden: Sequence[str], flat: Sequence[str]) -> rrb.Spatial3DView:
     """Return a view that travels with a robot, in the frame of its base, from as far as its size asks for."""
     eye = orbit(box.centre + _CLOSE_UP_DISTANCE * box.size * _CLOSE_UP, box.centre)
-    return _world(box.robot, [box.robot], box.base, rrb.LineGrid3D(visible=False), eye, hidden)
+    return _world(box.robot, [box.robot], box.base, rrb.LineGrid3D(visible=False), eye, hidden, flat)
 
 
 def _world(
@@ -160,6 +164,7 @@ def _world(
     grid: rrb.LineGrid3D,
     eye: rrb.EyeControls3D,
     hidden: Sequence[str],
+    flat: Sequence[str],
 ) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         name=name,
@@ -171,6 +176,7 @@ def _world(
             "+ /ros/**",
             "+ /cameras/**",
             *_without(robots, hidden),
+            *(f"- {entity}" for entity in flat),
         ],
         overrides=_whole_trails(robots),
         background=DARK,

@@ -273,7 +273,8 @@ class RerunSink:
             self._stage.fit()
             self._set_stage()
             # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-            shown = [source.entity for source in self._sources if isinstance(source, PictureChannel)]
+            cameras = [source for source in self._sources if isinstance(source, PictureChannel)]
+            shown = [source.entity for source in cameras]
             depths = (source for source in self._sources if isinstance(source, DepthChannel))
             shown += [source.entity for source in depths if source.has_images]
             blueprint = layout(
@@ -282,6 +283,7 @@ class RerunSink:
                 self._world.time_ns,
                 mirrors=self.mirrors,
                 pictures=shown,
+                flat=[source.entity for source in cameras if source.topic not in self._context.hung],
                 joints_move=any(
                     isinstance(source, JointChannel) and source.moves for source in self._sources
                 ),

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from rerun.experimental import ViewerClient
 
 from tests.cli.ros.conftest import Twin
 from tests.processes import free_endpoint, wait_for, wait_for_listener
+from twin.recording import player
+from twin.recording.player import has_vulkan, headless_viewer
 from twin.recording.read_back import Recording, read
 
 GRAPH = "watch_graph.py"
 
 
 @pytest.fixture(scope="module")
-def seen(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, str]:
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a watcher saves, if there is one."""
+    return tmp_path_factory.mktemp("watch") / "new" / "seen.rrd"
+
+
+@pytest.fixture(scope="module")
+def seen(endpoint: str, file: Path) -> tuple[Recording, str]:
     """What a watcher has drawn of the graph, and said."""
-    file = tmp_path_factory.mktemp("watch") / "new" / "seen.rrd"
     words = ["watch", "--save", str(file), "--for", "6", "--connect", endpoint]
     done = subprocess.run(
         [sys.executable, "-m", "twin.cli", *words], capture_output=True, text=True, timeout=120, check=False
@@ -71,9 +83,30 @@ def test_what_is_published_is_drawn_as_it_is(seen: tuple[Recording, str]) -> Non
     assert recording.scalars("/joints/robot/to_mast")[1][-1] == 0.25
 
 
+def test_a_picture_hangs_before_its_camera_and_depths_do_not(seen: tuple[Recording, str]) -> None:
+    """In the frame of `camera_info`, so that it travels with the camera; once, as it never changes."""
+    entity = "/cameras/camera/image_raw/compressed"
+    told = seen[0].columns[entity]
+    assert told["Pinhole:parent_frame"].values == [["laser"]]
+    assert told["Pinhole:resolution"].values == [[[32.0, 24.0]]]
+    k = np.array(told["Pinhole:image_from_camera"].values[0][0]).reshape(3, 3).T
+    assert k.tolist() == [[40.0, 0.0, 15.5], [0.0, 40.0, 11.5], [0.0, 0.0, 1.0]]
+    assert told["CoordinateFrame:frame"].values == told["Pinhole:child_frame"].values
+    assert "Pinhole:resolution" not in seen[0].columns["/cameras/depth/image_raw"]
+
+
+@pytest.mark.skipif(not has_vulkan(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
+@pytest.mark.usefixtures("seen")
+def test_no_view_of_a_graph_has_a_fault(file: Path) -> None:
+    with headless_viewer(file, time_s=3.0) as client:
+        views = client.get_state().views
+    assert {"World", "Map", "camera", "depth"} <= {view.name for view in views}
+    assert [(view.name, report) for view in views for report in view.reports] == []
+
+
 def test_what_is_not_drawn_is_told(seen: tuple[Recording, str]) -> None:
     told = seen[1]
-    assert "watching /camera/image_raw/compressed, /depth/image_raw" in told
+    assert "watching /camera/camera_info, /camera/image_raw/compressed, /depth/image_raw" in told
     assert "not drawn: /camera/image_raw, /imu; --topics shows" in told
     assert "Traceback" not in told
 
@@ -94,43 +127,131 @@ def test_nobody_is_there(twin: Twin) -> None:
     assert done.stderr.splitlines()[-1].startswith("error: /proc/no/seen.rrd: cannot write the recording")
 
 
+_LOST = """
+import os, signal, sys
+from twin.cli import main
+from twin.recording.watch.watcher import Watcher
+
+def update(self, update=Watcher.update):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        update(self)
+    except KeyboardInterrupt:
+        pass
+
+Watcher.update = update
+main()
+"""
+
+
+def test_ctrl_c_that_is_lost_while_something_is_drawn_ends_the_watch(endpoint: str, tmp_path: Path) -> None:
+    """C of Rerun and Arrow may make something else of it."""
+    words = ["watch", "--connect", endpoint, "--save", str(tmp_path / "seen.rrd")]
+    done = subprocess.run(
+        [sys.executable, "-c", _LOST, *words], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+
+
+Start = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def twins() -> Iterator[Start]:
+    """Start commands of `twin`, none of which outlives the test."""
+    with ExitStack() as stack:
+
+        def start(*words: str) -> subprocess.Popen[str]:
+            command = [sys.executable, "-m", "twin.cli", *words]
+            pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+            process = stack.enter_context(subprocess.Popen(command, text=True, **pipes))
+            stack.callback(process.kill)
+            return process
+
+        yield start
+
+
+def run(start: Start, folder: Path, *others: str) -> subprocess.Popen[str]:
+    return start("run", "diff_bot_figure8", "--no-record", *others, "--out", str(folder))
+
+
 @pytest.mark.long
-def test_a_run_is_the_same_whoever_watches_it(tmp_path: Path) -> None:
-    """One comes and goes by Ctrl-C; one comes and stops reading."""
-
-    def run(*others: str) -> subprocess.Popen[str]:
-        words = ["run", "diff_bot_figure8", "--no-record", *others]
-        command = [sys.executable, "-m", "twin.cli", *words, "--out", str(tmp_path / str(len(others)))]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-
-    def watch(file: Path, endpoint: str) -> subprocess.Popen[str]:
-        words = ["watch", "--save", str(file), "--connect", endpoint]
-        command = [sys.executable, "-m", "twin.cli", *words]
-        return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-
-    def digest(process: subprocess.Popen[str]) -> str:
-        words = process.communicate(timeout=200)[0].split()
-        return words[words.index("digest") + 1]
-
+def test_a_run_is_the_same_whoever_watches_it(twins: Start, tmp_path: Path) -> None:
+    """One was there before it and sees it end, one comes and goes by Ctrl-C, one comes and stops reading."""
     endpoint = free_endpoint()
-    watched = run("--pace", "1", "--listen", endpoint)
+    words = "watch", "--connect", endpoint
+    early = twins(*words, "--save", str(tmp_path / "early.rrd"))
+    watched = run(twins, tmp_path / "watched", "--pace", "1", "--listen", endpoint)
     wait_for_listener(endpoint)
-    guests = [watch(tmp_path / f"{name}.rrd", endpoint) for name in "ab"]
-    files = [tmp_path / f"{name}.rrd" for name in "ab"]
+    guests = [twins(*words, "--save", str(tmp_path / f"{name}.rrd")) for name in "ab"]
+    files = [tmp_path / f"{name}.rrd" for name in ("a", "b", "early")]
     wait_for(lambda: all(file.exists() and file.stat().st_size > 100_000 for file in files))
     os.kill(guests[1].pid, signal.SIGSTOP)
-    guests[0].send_signal(signal.SIGINT)
-    _, told = guests[0].communicate(timeout=60)
-    assert guests[0].returncode == 0
-    assert "Traceback" not in told
-    assert digest(watched) == digest(run())
+    assert "Traceback" not in ended(guests[0])
+    assert digest(watched) == digest(run(twins, tmp_path / "alone"))
     os.kill(guests[1].pid, signal.SIGCONT)
-    guests[1].send_signal(signal.SIGINT)
-    guests[1].communicate(timeout=60)
-    assert guests[1].returncode == 0
+    ended(guests[1])
     recording = read(tmp_path / "a.rrd")
     assert {"/ros/scan", "/ros/odom", "/tf", "/velocity/robot/linear/measured"} <= {*recording.entities}
     moved = [
         np.array(xyz) for (_, child), xyz in poses(recording, "/tf").items() if child == "base_footprint"
     ]
     assert np.linalg.norm(moved[-1]) > 0.01
+    told = ended(early)
+    assert "nobody publishes" in told
+    assert read(tmp_path / "early.rrd").column("/ros/odom", "Arrows3D:origins").times_ns[-1] > 33e9
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not has_vulkan(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
+def test_a_run_is_the_same_whatever_becomes_of_its_viewers(twins: Start, tmp_path: Path) -> None:
+    """The viewer of one page stops reading; the server of another is ended, and so is its watch."""
+    endpoint = free_endpoint()
+    watched = run(twins, tmp_path / "watched", "--pace", "1", "--listen", endpoint)
+    wait_for_listener(endpoint)
+    pages = [twins("watch", "--connect", endpoint, "--web") for _ in range(2)]
+    shown = [next(filter(None, map(re.compile(r"http://\S+").search, page.stderr or ()))) for page in pages]
+    url = unquote(shown[0].group().partition("?url=")[2])
+    port = player.free_port()
+    command = [player.viewer_binary(), "--bind", player.LOCALHOST, "--headless", "--port", str(port), url]
+    viewer = subprocess.Popen(
+        command, env=player.viewer_environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        wait_for(lambda: player.listens(port))
+        client = ViewerClient(f"rerun+http://{player.LOCALHOST}:{port}/proxy")
+        wait_for(lambda: "World" in {view.name for view in client.get_state().views})
+        viewer.send_signal(signal.SIGSTOP)
+        for server in children(pages[1].pid):
+            os.kill(server, signal.SIGTERM)
+        _, told = pages[1].communicate(timeout=60)
+        assert pages[1].returncode == 0
+        assert "nothing is shown any more" in told
+        assert watched.poll() is None
+        assert digest(watched) == digest(run(twins, tmp_path / "alone"))
+    finally:
+        viewer.kill()
+        viewer.wait()
+    assert "Traceback" not in ended(pages[0])
+
+
+def ended(process: subprocess.Popen[str]) -> str:
+    """End a command by Ctrl-C, and return what it has said."""
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 0, told
+    return told
+
+
+def digest(process: subprocess.Popen[str]) -> str:
+    words = process.communicate(timeout=200)[0].split()
+    return words[words.index("digest") + 1]
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes that a process of this computer has started."""
+    return [
+        int(child)
+        for file in Path(f"/proc/{pid}/task").glob("*/children")
+        for child in file.read_text().split()
+    ]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import sys
 import threading
+from io import BytesIO
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from twin.bridge import live, types
 from twin.bridge.msgs import LaserScan, OccupancyGrid, String, header
@@ -46,7 +48,10 @@ with live.join([], listen=[sys.argv[1]]) as process:
     scans = node.create_publisher(LaserScan, "scan")
     marks = node.create_publisher(types.get("visualization_msgs/msg/Marker"), "marks")
     raw = node.create_publisher(types.get("sensor_msgs/msg/Image"), "camera/image_raw")
-    node.create_publisher(types.get("sensor_msgs/msg/CompressedImage"), "camera/image_raw/compressed")
+    jpegs = node.create_publisher(types.get("sensor_msgs/msg/CompressedImage"), "camera/image_raw/compressed")
+    infos = node.create_publisher(types.get("sensor_msgs/msg/CameraInfo"), "camera/camera_info")
+    picture = BytesIO()
+    Image.new("RGB", (32, 24), "orange").save(picture, "jpeg")
     depths = node.create_publisher(types.get("sensor_msgs/msg/Image"), "depth/image_raw")
     joints = node.create_publisher(types.get("sensor_msgs/msg/JointState"), "joint_states")
     imu = node.create_publisher(types.get("sensor_msgs/msg/Imu"), "imu")
@@ -70,6 +75,12 @@ with live.join([], listen=[sys.argv[1]]) as process:
         image = message("sensor_msgs/msg/Image", header=header(now_ns, "laser"), height=2, width=3, step=12)
         image.encoding, image.data = "32FC1", np.full(6, 2.5, np.float32).view(np.uint8)
         depths.publish(image)
+        info = message("sensor_msgs/msg/CameraInfo", header=header(now_ns, "laser"), width=32, height=24)
+        info.k = np.array([40.0, 0.0, 15.5, 0.0, 40.0, 11.5, 0.0, 0.0, 1.0])
+        infos.publish(info)
+        jpeg = message("sensor_msgs/msg/CompressedImage", header=header(now_ns, "laser"), format="jpeg")
+        jpeg.data = np.frombuffer(picture.getvalue(), np.uint8)
+        jpegs.publish(jpeg)
         state = message("sensor_msgs/msg/JointState", header=header(now_ns, ""), name=["to_mast"])
         state.position = np.array([0.25])
         joints.publish(state)

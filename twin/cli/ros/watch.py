@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from twin.cli.interrupted import raise_swallowed
 from twin.cli.ros.endings import endless
 from twin.cli.ros.joining import PATIENCE_S, Joining, joins
 
@@ -54,6 +55,7 @@ def watch(
         end = None if duration is None else time.monotonic() + duration
 
         def is_over() -> bool:
+            raise_swallowed()  # as while Rerun draws
             return end is not None and time.monotonic() >= end
 
         try:

@@ -43,6 +43,10 @@ class Context:
     """By topic: what makes the pictures there."""
     images_period: Period | None
     """At its multiples [ns] pictures are kept; None: at no time."""
+    pictures: set[str] = field(default_factory=set)
+    """Topics of what cameras see in colours."""
+    hung: set[str] = field(default_factory=set)
+    """Those whose pictures hang in space, before their camera."""
     grids: dict[str, GridChannel] = field(default_factory=dict)
     """By topic: those that are open."""
 

@@ -55,6 +55,8 @@ class ImageChannel(Channel[tuple[int, rr.Image | rr.DepthImage]]):
         if image is not None:
             self._next_ns = next_due(period, sample.time_ns)
             self.rows.append((sample.time_ns, image))
+            if isinstance(image, rr.Image):
+                self.context.pictures.add(self.topic)
 
     def chunks(self, rows: list[tuple[int, rr.Image | rr.DepthImage]]) -> Iterator[Chunk]:
         """Yield the images."""

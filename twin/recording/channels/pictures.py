@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from twin.periods import next_due
 from twin.recording.channels.channel import Channel, Context
@@ -35,6 +35,7 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
         super().__init__(context, namespace, topic)
         self.entity = picture_entity(topic)
         self._next_ns = 0
+        context.pictures.add(topic)
         camera = context.cameras.get(topic)
         if camera is not None:
             self._mount(camera)
@@ -66,15 +67,29 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
             ),
             static=True,
         )
-        self.recording.log(
-            self.entity,
-            rr.Pinhole(
-                image_from_camera=lens.matrix,
-                resolution=[lens.width, lens.height],
-                parent_frame=place,
-                child_frame=f"image of {self.topic}",
-                image_plane_distance=_PLANE_M,
-            ),
-            rr.CoordinateFrame(f"image of {self.topic}"),
-            static=True,
-        )
+        hang(self.context, self.topic, place, lens.matrix, (lens.width, lens.height))
+
+
+def hang(context: Context, topic: str, frame: str, k: ArrayLike, size: tuple[int, int]) -> None:
+    """Hang the pictures of a topic before a camera.
+
+    Args:
+        context: Of the recording.
+        topic: Of the pictures.
+        frame: The optical frame, by its name in the recording.
+        k: The intrinsic matrix, shape (3, 3) [pixels].
+        size: Width and height [pixels].
+    """
+    context.hung.add(topic)
+    context.recording.log(
+        picture_entity(topic),
+        rr.Pinhole(
+            image_from_camera=k,
+            resolution=size,
+            parent_frame=frame,
+            child_frame=f"image of {topic}",
+            image_plane_distance=_PLANE_M,
+        ),
+        rr.CoordinateFrame(f"image of {topic}"),
+        static=True,
+    )

@@ -12,6 +12,7 @@ from twin.periods import next_due, period_of
 from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
 from twin.recording.channels.images import DepthChannel, ImageChannel
+from twin.recording.channels.pictures import hang
 from twin.recording.channels.spatial import Floats, PathChannel, PoseArrayChannel
 from twin.recording.channels.table import kind_of
 from twin.recording.columns import TIMELINE
@@ -60,6 +61,33 @@ class PolygonChannel(PathChannel):
         self.put(sample, outline)
 
 
+class CameraInfoChannel(Channel[Any]):
+    """sensor_msgs/CameraInfo: hangs the pictures of the topics beside it in space, before their camera."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        super().__init__(context, namespace, topic)
+        self._hung: dict[str, tuple[Any, ...]] = {}
+        """By topic of pictures: how."""
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Hang what does not hang so yet; a camera that is not calibrated has a K of zeros."""
+        info = sample.message
+        k = np.asarray(info.k, dtype=np.float64)
+        if not (np.isfinite(k).all() and k[0] > 0.0 and k[4] > 0.0 and info.width and info.height):
+            return
+        frame = self.context.frames.belief(self.namespace, info.header.frame_id)
+        how = (frame, *k.tolist(), info.width, info.height)
+        for topic in sorted(self.context.pictures):
+            beside = topic.removesuffix("/compressed").rpartition("/")[0] == self.topic.rpartition("/")[0]
+            if beside and self._hung.get(topic) != how:
+                self._hung[topic] = how
+                hang(self.context, topic, frame, k.reshape(3, 3), (info.width, info.height))
+
+    def chunks(self, rows: list[Any]) -> tuple[()]:
+        """Yield nothing: there are no rows."""
+        return ()
+
+
 class TextChannel(Channel[Any]):
     """Any message as YAML to read, as it was last."""
 
@@ -88,6 +116,7 @@ _MORE: dict[str, type[Channel[Any]]] = {
     "geometry_msgs/msg/PoseWithCovarianceStamped": PoseChannel,
     "nav2_msgs/msg/ParticleCloud": ParticleChannel,
     "nav_msgs/msg/Odometry": PoseChannel,
+    "sensor_msgs/msg/CameraInfo": CameraInfoChannel,
     "sensor_msgs/msg/Image": ImageChannel,
     "visualization_msgs/msg/Marker": MarkerChannel,
     "visualization_msgs/msg/MarkerArray": MarkerChannel,

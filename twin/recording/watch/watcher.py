@@ -160,7 +160,7 @@ class Watcher:
             RecordingError: The file cannot be written, or the screen is not there.
         """
         self._time = GraphTime(self._now_ns(), simulated=self._sim_time.now_ns > 0)
-        blueprint = graph_layout(self._floor, ["robot"], (), (), {})
+        blueprint = graph_layout(self._floor, ["robot"], (), (), (), {})
         self._recording = open_recording(target, "twin-watch", "graph", blueprint, screen)
         self._target, self._screen = target, screen
         declare_up(self._recording)
@@ -341,9 +341,11 @@ class Watcher:
     def _lay_out(self, channels: Sequence[Channel[Any]]) -> None:
         """Send the screen's layout, if there is something new to see."""
         names = ["robot", *self._frames.robots]
-        pictures = [each.entity for each in channels if isinstance(each, PictureChannel | ImageChannel)]
+        cameras = [each for each in channels if isinstance(each, PictureChannel | ImageChannel)]
+        pictures = [each.entity for each in cameras]
+        flat = [each.entity for each in cameras if each.topic not in self._context.hung]
         texts = {f"{TEXT}{each.topic}": each.topic for each in channels if isinstance(each, TextChannel)}
-        views = (self._floor, names, list(self._robots.boxes), pictures, texts)
+        views = (self._floor, names, list(self._robots.boxes), pictures, flat, texts)
         if self._views is not None and [id(views[0]), *views[1:]] == self._views:
             return
         self._views = [id(views[0]), *views[1:]]
