@@ -29,12 +29,16 @@ if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays f
     _Take = Callable[[Sample[Any]], None]
 
 _NS = 1_000_000_000
-_PICTURE = "sensor_msgs/msg/CompressedImage"
+_PICTURE, _PACKED_DEPTHS = "sensor_msgs/msg/CompressedImage", "/compressedDepth"
 _CLOUD = "sensor_msgs/msg/PointCloud2"
 _COLLECTING = 0.9
 """Part of what a killed run loses during which rows are collected; in the rest of it they are written."""
 NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
 NO_CAMERAS: Mapping[str, Mounted] = MappingProxyType({})
+
+
+def _is_picture(publisher: Publisher[Any]) -> bool:
+    return publisher.msgtype == _PICTURE and not publisher.name.endswith(_PACKED_DEPTHS)
 
 
 class _Moment(NamedTuple):
@@ -216,8 +220,8 @@ class RerunSink:
         """Return whether it shows a cloud, or a picture of a camera that is due (for `Bus.wishes`)."""
         if publisher.msgtype == _CLOUD:  # a camera shows its own as a picture
             topics = (each for each in publisher.node.endpoints if isinstance(each, type(publisher)))
-            return not self._closed and all(each.msgtype != _PICTURE for each in topics)
-        if publisher.msgtype != _PICTURE or self._images_period is None or self._closed:
+            return not self._closed and not any(map(_is_picture, topics))
+        if not _is_picture(publisher) or self._images_period is None or self._closed:
             return False
         now_ns = publisher.node.now_ns
         if now_ns < self._pictures.get(publisher.name, 0):

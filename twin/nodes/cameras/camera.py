@@ -94,6 +94,7 @@ class CameraPublisher:
             offered["jpeg"] = CompressedImage, f"{topics.image}/compressed"
         if spec.depth:
             offered["depth"] = Image, topics.depth
+            offered["png"] = CompressedImage, f"{topics.depth}/compressedDepth"
             offered["depth_info"] = CameraInfo, topics.depth_info
             offered["points"] = PointCloud2, topics.points
         self._publishers: Mapping[str, Publisher[Any]] = {
@@ -125,7 +126,7 @@ class CameraPublisher:
         if not wanted:
             return
         colours = bool(wanted & {"image", "jpeg"}) or ("points" in wanted and self.spec.colour)
-        depth = bool(wanted & {"depth", "points"})
+        depth = bool(wanted & {"depth", "png", "points"})
         seen = self._look(time_ns, colours, depth) if colours or depth else None
         header, spec = Header(stamp(self.node.now_ns), self._frame), self.spec
         said: dict[str, Any] = {}
@@ -137,8 +138,12 @@ class CameraPublisher:
             if "jpeg" in wanted:
                 said["jpeg"] = messages.jpeg(header, seen.colours, spec.encoding)
         if seen is not None and seen.depth is not None:
-            if "depth" in wanted:
-                said["depth"] = messages.depth_image(header, seen.depth, spec.depth_encoding)
+            if wanted & {"depth", "png"}:
+                depths = messages.depth_image(header, seen.depth, spec.depth_encoding)
+                if "depth" in wanted:
+                    said["depth"] = depths
+                if "png" in wanted:
+                    said["png"] = messages.compressed_depth(header, depths)
             if "points" in wanted:
                 rgb = None if seen.colours is None else messages.rgb(seen.colours, spec.encoding)
                 said["points"] = messages.cloud(header, self._lens, seen.depth, rgb)
