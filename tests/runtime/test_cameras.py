@@ -14,6 +14,7 @@ from PIL import Image as Pillow
 
 from tests.drawing import needs_opengl
 from twin.errors import SimulationError
+from twin.nodes.cameras.messages import compressed_depth
 from twin.recording.read_back import read
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import Scenario
@@ -105,6 +106,19 @@ def test_all_that_a_camera_says_fits_together(scenario: Load) -> None:
         assert not cloud.is_dense
         crate = z[100:140, 60:120]
         assert 0.9 < np.nanmin(crate) < 1.2  # from the camera to the near side of the crate
+    run.close()
+
+
+@needs_opengl
+def test_a_compressed_depth_is_that_of_the_image(scenario: Load) -> None:
+    run = OpenRun(scenario(text()), record=False)
+    depth = "camera/depth/image_raw"
+    audience = Audience(run, depth, f"{depth}/compressedDepth")
+    run.advance()
+    plain, packed = audience.heard[depth], audience.heard[f"{depth}/compressedDepth"]
+    assert [message.header for message in plain] == [message.header for message in packed]
+    for image, message in zip(plain, packed, strict=True):
+        assert (message.data == compressed_depth(image.header, image).data).all()
     run.close()
 
 

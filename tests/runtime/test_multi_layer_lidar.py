@@ -237,3 +237,24 @@ def test_clouds_and_single_points_drop_out(of: str, scenario: MakeScenario, make
     assert [len(points) / 28800 for points in kept] == pytest.approx([0.6] * 5, abs=0.02)
     assert kept[0] <= set(read_points(whole[0]).tolist())
     assert (lossy[0].is_dense, lossy[0].point_step, lossy[0].header) == (True, 22, whole[0].header)
+
+
+@pytest.mark.parametrize("kind", ["stop", "freeze", "nan", "blind"])
+def test_a_lidar_that_fails_sends_no_cloud_of_use(
+    scenario: MakeScenario, make_run: MakeRun, kind: str
+) -> None:
+    fault = f"faults: [{{lidar: {{sensor: velodyne_points, kind: {kind}, at: 0.25 s}}}}]\n"
+    clouds = clouds_of(make_run(scenario(ROOM.format(v=0.5, w=0, noise=0, seed=1) + fault)))
+    stamps = [ns(cloud.header.stamp) for cloud in clouds]
+    assert stamps == [10**7 + k * 10**8 for k in range(2 if kind == "stop" else 5)]
+    before, *after = (read_points(cloud) for cloud in clouds[1:])
+    assert np.isfinite(before["x"]).all()
+    for points in after:
+        if kind == "freeze":
+            assert (points == before).all()
+        elif kind == "blind":
+            assert len(points) == 0
+        else:
+            assert len(points) > 20_000
+            assert np.isnan(coordinates(points)).all()
+            assert (points["ring"][:16] == np.arange(16)).all()

@@ -111,6 +111,11 @@ if TYPE_CHECKING:
     JointTrajectoryControllerState: Any
     AprilTagDetection: Any
     AprilTagDetectionArray: Any
+    Detection2D: Any
+    Detection2DArray: Any
+    LabelInfo: Any
+    ObjectHypothesisWithPose: Any
+    VisionClass: Any
 
 _NAMES = {
     "action_msgs": "GoalInfo GoalStatus GoalStatusArray",
@@ -150,6 +155,7 @@ _NAMES = {
     "explore_lite_msgs": "ExploreStatus",
     "control_msgs": "GripperCommand JointTolerance JointTrajectoryControllerState",
     "apriltag_msgs": "AprilTagDetection AprilTagDetectionArray",
+    "vision_msgs": "Detection2D Detection2DArray LabelInfo ObjectHypothesisWithPose VisionClass",
 }
 """Package -> its messages that are here."""
 _ALIASES = {"GripperCommand": "GripperCommandMsg"}

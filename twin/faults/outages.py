@@ -11,6 +11,7 @@ import numpy as np
 
 from twin.bridge.msgs import PointCloud2
 from twin.bridge.point_cloud2 import cloud_of, read_points
+from twin.clouds.points import XYZ
 from twin.faults.fault import Effect, FaultContext, refuse
 from twin.faults.messages import Counted, linked
 from twin.faults.quantities import altered, values_of, with_field
@@ -19,6 +20,7 @@ from twin.geometry import Array
 from twin.parameters import Fraction, Positive, Seconds, Share
 from twin.scenario.faults import LastingRobotFault
 from twin.sensors.lidar import Lidar
+from twin.sensors.multi_layer_lidar import MultiLayerLidar
 
 
 class Dropout(ReadingFault):
@@ -134,7 +136,7 @@ class Delay(ReadingFault):
 class LidarFailure(Freeze):
     """A lidar delivers nothing, or nothing of use."""
 
-    device = Lidar
+    devices = Lidar, MultiLayerLidar
 
     @dataclass(frozen=True, kw_only=True)
     class Config(LastingRobotFault):
@@ -144,7 +146,8 @@ class LidarFailure(Freeze):
         """Topic of the lidar."""
         kind: Literal["stop", "freeze", "nan", "blind"]
         """`stop`: no scan comes. `freeze`: the last one comes again and again, with new stamps. `nan`: every
-        reading is NaN. `blind`: every reading is inf, as if nothing were there."""
+        reading, or point of a cloud, is NaN. `blind`: every reading is inf, as if nothing were there, and a
+        cloud is empty."""
 
     def __init__(self, name: str, config: Config, context: FaultContext) -> None:
         super().__init__(name, config, context)
@@ -158,5 +161,13 @@ class LidarFailure(Freeze):
             return None
         if self.config.kind == "freeze":
             return super().alter(reading, time_ns)
+        if isinstance(reading, PointCloud2):
+            points = read_points(reading)
+            if self.config.kind == "blind":
+                return cloud_of(reading.header, points[:0])
+            points = points.copy()
+            for axis in XYZ:
+                points[axis] = math.nan
+            return cloud_of(reading.header, points)
         value = math.nan if self.config.kind == "nan" else math.inf
         return altered(reading, "ranges", lambda values: np.full_like(values, value))

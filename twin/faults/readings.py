@@ -45,8 +45,8 @@ class QuantityConfig(ReadingConfig):
 class ReadingFault(FaultOfRobot):
     """Changes the readings of a sensor, before anybody hears of them."""
 
-    device: ClassVar[type] = object
-    """Of which class the sensor must be."""
+    devices: ClassVar[tuple[type, ...]] = (object,)
+    """Of which classes the sensor must be one."""
     did = "altered"
     """What it does to readings, in a word."""
 
@@ -55,11 +55,11 @@ class ReadingFault(FaultOfRobot):
         sensors: dict[str, SensorPublisher | None] = {
             publisher.sensor.spec.topic: publisher
             for publisher in self.robot.sensors
-            if isinstance(publisher.sensor, self.device)
+            if isinstance(publisher.sensor, self.devices)
         }
-        if self.device is object:
+        if object in self.devices:
             sensors[JOINT_STATES] = None
-        what = self.device.__name__.lower() if self.device is not object else "sensor"
+        what = "sensor" if object in self.devices else self.devices[0].__name__.lower()
         one_of(what, config.sensor, sensors, "sensor", self.robot.name)
         self.publisher = sensors[config.sensor]
         if self.publisher is None:

@@ -96,6 +96,11 @@ class CameraTopics:
     depth: str
     depth_info: str
     points: str
+    labels_map: str
+    """What each pixel shows, of cameras that see the truth; so are those that follow."""
+    colored_map: str
+    label_info: str
+    boxes: str
 
     @classmethod
     def below(cls, base: str) -> CameraTopics:
@@ -106,7 +111,14 @@ class CameraTopics:
             depth=f"{base}/depth/image_raw",
             depth_info=f"{base}/depth/camera_info",
             points=f"{base}/depth/points",
+            **cls.of_truth(f"{base}/ground_truth"),
         )
+
+    @staticmethod
+    def of_truth(base: str) -> dict[str, str]:
+        """Return the names that Gazebo uses below the topic of a camera of labels, by field."""
+        names = ("labels_map", "colored_map", "label_info")
+        return {**{name: f"{base}/{name}" for name in names}, "boxes": f"{base}/boxes"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +157,8 @@ class CameraSpec(SensorSpec):
     """Whether it makes images of colours."""
     depth: bool = False
     """Whether it makes images of depth."""
+    truth: Literal["semantic", "instance", "boxes"] | None = None
+    """What it knows of things instead of seeing them: labels of kinds, or of each; or boxes around each."""
     encoding: Literal["rgb8", "bgr8", "mono8"] = "rgb8"
     """Of the images of colours."""
     depth_encoding: Literal["32FC1", "16UC1"] = "32FC1"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # rerun takes 0.4 s to import: only a run that records pays f
     _Take = Callable[[Sample[Any]], None]
 
 _NS = 1_000_000_000
-_PICTURE = "sensor_msgs/msg/CompressedImage"
+_PICTURE, _PACKED_DEPTHS = "sensor_msgs/msg/CompressedImage", "/compressedDepth"
 _APPLICATION_ID = "twin"
 """Under which the viewer stores changes to the layout."""
 _CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -37,6 +37,10 @@ _COLLECTING = 0.9
 """Part of what a killed run loses during which rows are collected; in the rest of it they are written."""
 NO_WHEELS: Mapping[str, Collection[str]] = MappingProxyType({})
 NO_CAMERAS: Mapping[str, Mounted] = MappingProxyType({})
+
+
+def _is_picture(publisher: Publisher[Any]) -> bool:
+    return publisher.msgtype == _PICTURE and not publisher.name.endswith(_PACKED_DEPTHS)
 
 
 class _Moment(NamedTuple):
@@ -221,8 +225,8 @@ class RerunSink:
         """Return whether it shows a cloud, or a picture or depths that are due (for `Bus.wishes`)."""
         if publisher.msgtype == _CLOUD:  # a camera shows its own as a picture
             topics = (each for each in publisher.node.endpoints if isinstance(each, type(publisher)))
-            return not self._closed and all(each.msgtype != _PICTURE for each in topics)
-        if publisher.msgtype != _PICTURE and publisher.name not in self._depths:
+            return not self._closed and not any(map(_is_picture, topics))
+        if not _is_picture(publisher) and publisher.name not in self._depths:
             return False
         if self._images_period is None or self._closed:
             return False

@@ -7,6 +7,8 @@ import ctypes.util
 import os
 import sys
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -23,7 +25,7 @@ PACKAGES = "`apt-get install libegl1 libgl1-mesa-dri`, or `libosmesa6` and MUJOC
 
 _FLAGS = mujoco.mjtRndFlag
 _PLAIN = {_FLAGS.mjRND_SEGMENT: 1, _FLAGS.mjRND_IDCOLOR: 1}
-"""For a picture of distances: no light, and no sky, which is a box before the far plane."""
+"""For a picture of distances or numbers: no light, and no sky, which is a box before the far plane."""
 
 
 class Canvas:
@@ -64,14 +66,19 @@ class Canvas:
         """Return OpenGL's depth, shape (height, width): 0 in the sky, 1 at the near plane."""
         frame = self._frame(width, height)
         picture = np.empty((frame.height, frame.width), np.float32)
-        before = scene.flags.copy()
-        for flag, value in _PLAIN.items():
-            scene.flags[flag] = value
         self._opengl.make_current()
-        mujoco.mjr_render(frame, scene, self._context)
+        with _plain(scene):
+            mujoco.mjr_render(frame, scene, self._context)
         mujoco.mjr_readPixels(None, picture, frame, self._context)
-        scene.flags[:] = before
         return picture[::-1]
+
+    def numbers(
+        self, scene: mujoco.MjvScene, width: int | None = None, height: int | None = None
+    ) -> NDArray[np.int32]:
+        """Return the `segid` of what each pixel shows, from 1, shape (height, width); 0 in the sky."""
+        with _plain(scene):
+            red, green, blue = self.draw(scene, width, height).astype(np.int32).transpose(2, 0, 1)
+        return red | green << 8 | blue << 16
 
     def _frame(self, width: int | None, height: int | None) -> mujoco.MjrRect:
         return mujoco.MjrRect(0, 0, width or self._size[0], height or self._size[1])
@@ -80,6 +87,15 @@ class Canvas:
         """Free what the graphics driver holds. Harmless when repeated."""
         atexit.unregister(self._free)
         self._free()
+
+
+@contextmanager
+def _plain(scene: mujoco.MjvScene) -> Iterator[None]:
+    before = scene.flags.copy()
+    for flag, value in _PLAIN.items():
+        scene.flags[flag] = value
+    yield
+    scene.flags[:] = before
 
 
 def _free(opengl: Any, context: mujoco.MjrContext, process: int) -> None:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from twin.sim.alterations import Alterations
     from twin.sim.cameras.camera import Camera
     from twin.sim.cameras.eyes import Eyes
+    from twin.sim.cameras.labels import TrueEyes
 
 
 class World:
@@ -70,7 +71,7 @@ class World:
         self._guard = DivergenceGuard(self.model, self.data)
         self._statics = {static.name: static.T_world_body for static in scene.statics}
         self._bind_bodies()
-        self._contact_reader = ContactReader(self.model, *self._geom_owners(), savings)
+        self._contact_reader = ContactReader(self.model, *self.geom_owners(self.model), savings)
         self.robots: Mapping[str, RobotHandle] = MappingProxyType(
             {placement.name: self._bind_robot(placement) for placement in robots}
         )
@@ -296,6 +297,10 @@ class World:
 
         return dressed(self.scene, self._placements, self.physics)
 
+    def spec_of_shapes(self) -> mujoco.MjSpec:
+        """Return the model to see, each shape by itself and without textures, before it is compiled."""
+        return build_spec(self.scene, self._placements, self.physics)
+
     @cached_property
     def eyes(self) -> Eyes:
         """What draws what cameras see.
@@ -305,13 +310,44 @@ class World:
         """
         from twin.sim.cameras.eyes import Eyes
 
-        return Eyes(self)
+        return Eyes(self, self.spec_to_see(), [camera for camera in self._cameras if not camera.spec.truth])
+
+    @cached_property
+    def true_eyes(self) -> TrueEyes:
+        """What knows which things cameras see.
+
+        Raises:
+            SimulationError: Nothing can be drawn on this computer.
+        """
+        from twin.sim.cameras.labels import TrueEyes
+
+        return TrueEyes(self, [camera for camera in self._cameras if camera.spec.truth])
+
+    @property
+    def _cameras(self) -> list[Camera]:
+        return [camera for robot in self.robots.values() for camera in robot.cameras]
 
     def close(self) -> None:
         """Free what the graphics driver holds for cameras. Harmless when repeated."""
-        eyes = self.__dict__.pop("eyes", None)
+        eyes, true_eyes = self.__dict__.pop("eyes", None), self.__dict__.pop("true_eyes", None)
         if eyes is not None:
             eyes.close()
+        if true_eyes is not None:
+            true_eyes.eyes.close()
+
+    def geom_owners(self, model: mujoco.MjModel) -> tuple[list[str], list[int]]:
+        """Return for each geom the name of its body or static, and its robot (-1: none, -2: the floor).
+
+        `model` is the world's own, or one with the same scene and robots.
+        """
+        owners = [model.body(body).name for body in model.geom_bodyid]
+        robot_of = {placement.name: i for i, placement in enumerate(self._placements)}
+        robots = [robot_of.get(body.partition("/")[0], -1) if "/" in body else -1 for body in owners]
+        for static in self.scene.statics:
+            for index in range(len(static.shapes)):
+                owners[model.geom(static_geom(static.name, index)).id] = static.name
+        owners[model.geom(FLOOR).id], robots[model.geom(FLOOR).id] = FLOOR, -2
+        return owners, robots
 
     def state_digest(self) -> bytes:
         """Return the SHA-256 of positions, velocities, activations, kinematic poses and time."""
@@ -324,7 +360,7 @@ class World:
     def save_model(self, folder: Path) -> Path:
         """Write the world as `world.xml` with its meshes in `assets/`, for any MuJoCo tool."""
         folder.mkdir(parents=True, exist_ok=True)
-        spec = build_spec(self.scene, self._placements, self.physics)
+        spec = self.spec_of_shapes()
         for name, content in spec.assets.items():
             asset = folder / "assets" / name
             asset.parent.mkdir(parents=True, exist_ok=True)
@@ -345,18 +381,6 @@ class World:
         self._body_ids = np.array(ids, dtype=np.intp)
         self._xpos, self._xquat = self.data.xpos, self.data.xquat  # views, made once, as in `Hardware`
         self._placed = {body.name: int(self.model.body(body.name).mocapid[0]) for body in self.scene.placed}
-
-    def _geom_owners(self) -> tuple[list[str], list[int]]:
-        """Return for each geom the name of its body or static, and its robot (-1: none, -2: the floor)."""
-        model = self.model
-        owners = [model.body(body).name for body in model.geom_bodyid]
-        robot_of = {placement.name: i for i, placement in enumerate(self._placements)}
-        robots = [robot_of.get(body.partition("/")[0], -1) if "/" in body else -1 for body in owners]
-        for static in self.scene.statics:
-            for index in range(len(static.shapes)):
-                owners[model.geom(static_geom(static.name, index)).id] = static.name
-        owners[model.geom(FLOOR).id], robots[model.geom(FLOOR).id] = FLOOR, -2
-        return owners, robots
 
     def _bind_robot(self, placement: RobotPlacement) -> RobotHandle:
         name, description = placement.name, placement.conversion.description

@@ -153,9 +153,56 @@ def test_depth_is_as_wrong_as_the_models_say(camera_at: Look, noise: str, sigma:
     inside = f"<depth_camera><noise>{noise}</noise></depth_camera>"
     depth = camera_at(WALL, inside=inside).look(0, colours=False, depth=True).depth
     assert depth is not None
-    wall = depth[:60].astype(float)
-    assert abs(wall.mean() - 3.0) < 0.05 * sigma
-    assert abs(wall.std() / sigma - 1.0) < 0.05
+    wall = depth[:60, 10:].astype(float)
+    assert np.isfinite(wall).all()
+    assert np.isnan(depth[:60, 0]).all()  # the other view sees less at this side
+    inverse, sigma = 1.0 / wall, sigma / 9.0  # which is what such cameras measure
+    assert abs(inverse.mean() - 1.0 / 3.0) < 0.06 * sigma
+    assert abs(inverse.std() / sigma - 1.0) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("noise", "step", "baseline"),
+    [
+        ("<type>kinect</type>", 2.85e-3, 0.075),
+        (
+            "<type>realsense</type><subpixel>0.05</subpixel><baseline>0.2</baseline>",
+            1.0 / (32.0 * 0.2 * 80.0 / np.tan(0.6)),
+            0.2,
+        ),
+    ],
+    ids=["kinect", "realsense"],
+)
+def test_depth_comes_in_steps_and_has_holes_behind_edges(
+    camera_at: Look, noise: str, step: float, baseline: float
+) -> None:
+    near = StaticBody(
+        name="near",
+        T_world_body=Pose3.from_xyz_rpy((EYE[0] + 1.05, 0.0, EYE[2])),
+        shapes=(Shape(geometry=Box(size=(0.1, 0.4, 0.4))),),
+    )
+    camera = camera_at(WALL, near, inside=f"<depth_camera><noise>{noise}</noise></depth_camera>")
+    depth = camera.look(0, colours=False, depth=True).depth
+    assert depth is not None
+    steps = 1.0 / (depth[np.isfinite(depth)].astype(float) * step)
+    assert np.abs(steps - np.rint(steps)).max() < 1e-3
+    # Of the wall 3 m away, the box 1 m away hides from the other view what is to the left of it.
+    f = 80.0 / np.tan(0.6)
+    shadow = f * baseline * (1.0 / 1.0 - 1.0 / 3.0)
+    row, left = depth[59], round(79.5 - 0.2 * f)
+    holes = np.flatnonzero(np.isnan(row[40:80])) + 40
+    assert abs(len(holes) - shadow) <= 2
+    assert (np.diff(holes) == 1).all()
+    assert abs(holes.max() - left) <= 1
+    right = np.flatnonzero(np.isnan(row[80:]))
+    assert len(right) <= 2  # an edge, no shadow
+
+
+def test_what_is_too_near_has_no_depth(camera_at: Look) -> None:
+    inside = "<depth_camera><noise><type>realsense</type><baseline>4</baseline></noise></depth_camera>"
+    depth = camera_at(WALL, inside=inside).look(0, colours=False, depth=True).depth
+    assert depth is not None
+    assert np.isnan(depth[:60]).all()  # at 3 m the disparity is 156 pixels, and 126 are searched
 
 
 def test_a_camera_faster_than_the_physics_is_refused(camera_at: Look) -> None:

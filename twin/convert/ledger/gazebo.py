@@ -37,6 +37,8 @@ OF_CAMERAS: Mapping[str, Fate] = MappingProxyType(
         "clip/far": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
         "image/format": ("dropped", ELSEWHERE),
         "optical_frame_id": ("dropped", ELSEWHERE),
+        "segmentation_type": ("dropped", ELSEWHERE),
+        "box_type": ("dropped", ELSEWHERE),
         **{
             f"distortion/{name}": ("dropped", f"MuJoCo has no lenses; {ELSEWHERE}")
             for name in ("k1", "k2", "k3", "p1", "p2")

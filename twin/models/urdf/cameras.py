@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from twin.models.description import Link
 from twin.models.specs import CameraSpec, CameraTopics, DepthNoise
@@ -32,10 +32,25 @@ _SEES: Mapping[str, int] = MappingProxyType(
         "depth_camera": _DEPTH,
         "rgbd": _COLOUR | _DEPTH,
         "rgbd_camera": _COLOUR | _DEPTH,
+        "segmentation": 0,
+        "segmentation_camera": 0,
+        "boundingbox": 0,
+        "boundingbox_camera": 0,
     }
 )
 CAMERA = tuple(_SEES)
 """Types whose image a pinhole camera makes."""
+_Truth: TypeAlias = Literal["semantic", "instance", "boxes"]
+_TRUTHS: Mapping[str, tuple[str, Mapping[str, _Truth]]] = MappingProxyType(
+    {
+        "segmentation": (
+            "segmentation_type",
+            {"semantic": "semantic", "instance": "instance", "panoptic": "instance"},
+        ),
+        "boundingbox": ("box_type", {"visible_2d": "boxes", "2d": "boxes", "visible_box_2d": "boxes"}),
+    }
+)
+"""By what the type begins with: the element that says which, and what its words mean; the first is usual."""
 DEFAULTS: Mapping[str, float] = MappingProxyType(
     {
         "horizontal_fov": 1.047,
@@ -86,7 +101,10 @@ def read_cameras(
             names = [*taken, *(other.name for other in cameras)]
             own = unique_name(name or spec.name, link, names)
             topics = _topics(element, own)
-            topic = topics.image if spec.colour else topics.depth
+            if spec.truth is not None:
+                topic = topics.boxes if spec.truth == "boxes" else topics.labels_map
+            else:
+                topic = topics.image if spec.colour else topics.depth
             cameras.append(replace(spec, name=own, topic=topic, topics=topics))
     return tuple(cameras)
 
@@ -138,6 +156,7 @@ def _read(sensor: Element, camera: Element, link: str, report: Report) -> Camera
         optical_frame=text_of(sensor, "camera/optical_frame_id", *FRAME_TAGS),
         colour=bool(sees & _COLOUR),
         depth=bool(sees & _DEPTH),
+        truth=None if sees else _truth(sensor, camera, report),
         encoding=ENCODINGS.get(format_.upper(), "rgb8"),
         depth_encoding="16UC1" if coarse.upper() in ("16UC1", "L16", "L_INT16", "R_UINT16") else "32FC1",
         depth_noise=_depth_noise(sensor, camera, report),
@@ -152,6 +171,15 @@ def _size(sensor: Element, width: float, height: float, report: Report) -> tuple
             add_fault(report, sensor, f" has an image of {width:g} x {height:g} pixels; valid are {valid}")
             return 1.0, 1.0
     return width, height
+
+
+def _truth(sensor: Element, camera: Element, report: Report) -> _Truth:
+    """Return what a camera of labels or boxes tells."""
+    tag, meanings = _TRUTHS[kind_of(sensor).removesuffix("_camera")]
+    said = text_of(camera, tag) or next(iter(meanings))
+    if said not in meanings:
+        add_fault(report, sensor, f" has a <{tag}> of '{said}'; valid are {', '.join(meanings)}")
+    return meanings.get(said, next(iter(meanings.values())))
 
 
 def _depth_noise(sensor: Element, camera: Element, report: Report) -> DepthNoise | None:
@@ -181,7 +209,11 @@ def _topics(sensor: Element, name: str) -> CameraTopics:
         base = f"{space}/{base}"
     given = _relative(text_of(sensor, "topic"))
     sees = _SEES[kind_of(sensor)]
-    if given and sees == _COLOUR | _DEPTH:
+    if given and not sees:
+        topics = replace(CameraTopics.below(given), **CameraTopics.of_truth(given))
+        if kind_of(sensor).startswith("boundingbox"):
+            topics = replace(topics, boxes=given)
+    elif given and sees == _COLOUR | _DEPTH:
         topics = CameraTopics.below(given)
     elif given:
         above = given.rpartition("/")[0]

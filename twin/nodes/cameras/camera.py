@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
-from typing import Any, Literal, Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from twin.models.optical_frames import T_CAMERA_OPTICAL, optical_frame
 from twin.models.specs import CameraSpec
 from twin.nodes.cameras import messages
 
+T = TypeVar("T")
 _LOG = logging.getLogger("twin.camera")
 
 
@@ -86,27 +87,19 @@ class CameraPublisher:
         self.node = bus.create_node(f"{self.spec.name}_driver", namespace)
         self._need, self._is_blind = need, False
         self._lens = self.spec.lens
-        spec, topics = self.spec, self.spec.topics
-        offered: dict[str, tuple[type, str]] = {}
-        if spec.colour:
-            offered["image"] = Image, topics.image
-            offered["info"] = CameraInfo, topics.info
-            offered["jpeg"] = CompressedImage, f"{topics.image}/compressed"
-        if spec.depth:
-            offered["depth"] = Image, topics.depth
-            offered["depth_info"] = CameraInfo, topics.depth_info
-            offered["points"] = PointCloud2, topics.points
         self._publishers: Mapping[str, Publisher[Any]] = {
             what: self.node.create_publisher(kind, topic, SENSOR_DATA, on_demand=True)
-            for what, (kind, topic) in offered.items()
+            for what, (kind, topic) in self._offered().items()
         }
-        self._frame, is_link = optical_frame(description, spec)
-        self.T_link_optical = spec.T_link_sensor @ T_CAMERA_OPTICAL
+        self._frame, is_link = optical_frame(description, self.spec)
+        self.T_link_optical = self.spec.T_link_sensor @ T_CAMERA_OPTICAL
         """Its optical frame in that of its link."""
         if not is_link:
             placed = self.T_link_optical
             self._static = StaticTransformBroadcaster(self.node)
-            self._static.send_transform(transform_stamped(spec.link, self._frame, self.node.now_ns, placed))
+            self._static.send_transform(
+                transform_stamped(self.spec.link, self._frame, self.node.now_ns, placed)
+            )
         if need == "required":
             camera.open()
 
@@ -129,10 +122,32 @@ class CameraPublisher:
         wanted = {what for what, publisher in self._publishers.items() if publisher.is_wanted}
         if not wanted:
             return
+        said = self._said(wanted, time_ns, Header(stamp(self.node.now_ns), self._frame))
+        for what, publisher in self._publishers.items():
+            if what in said:
+                publisher.publish(said[what], frozen=True)
+
+    def _offered(self) -> dict[str, tuple[type, str]]:
+        """Return types and topics of what it publishes."""
+        spec, topics = self.spec, self.spec.topics
+        offered: dict[str, tuple[type, str]] = {}
+        if spec.colour:
+            offered["image"] = Image, topics.image
+            offered["info"] = CameraInfo, topics.info
+            offered["jpeg"] = CompressedImage, f"{topics.image}/compressed"
+        if spec.depth:
+            offered["depth"] = Image, topics.depth
+            offered["png"] = CompressedImage, f"{topics.depth}/compressedDepth"
+            offered["depth_info"] = CameraInfo, topics.depth_info
+            offered["points"] = PointCloud2, topics.points
+        return offered
+
+    def _said(self, wanted: set[str], time_ns: int, header: Header) -> dict[str, Any]:
+        """Return the messages that are wanted, as far as it can look."""
         colours = bool(wanted & {"image", "jpeg"}) or ("points" in wanted and self.spec.colour)
-        depth = bool(wanted & {"depth", "points"})
-        seen = self._look(time_ns, colours, depth) if colours or depth else None
-        header, spec = Header(stamp(self.node.now_ns), self._frame), self.spec
+        depth = bool(wanted & {"depth", "png", "points"})
+        look, spec = self.sensor.look, self.spec
+        seen = self._seen(lambda: look(time_ns, colours=colours, depth=depth)) if colours or depth else None
         said: dict[str, Any] = {}
         for what in sorted(wanted & {"info", "depth_info"}):
             said[what] = messages.camera_info(header, self._lens)
@@ -142,21 +157,23 @@ class CameraPublisher:
             if "jpeg" in wanted:
                 said["jpeg"] = messages.jpeg(header, seen.colours, spec.encoding)
         if seen is not None and seen.depth is not None:
-            if "depth" in wanted:
-                said["depth"] = messages.depth_image(header, seen.depth, spec.depth_encoding)
+            if wanted & {"depth", "png"}:
+                depths = messages.depth_image(header, seen.depth, spec.depth_encoding)
+                if "depth" in wanted:
+                    said["depth"] = depths
+                if "png" in wanted:
+                    said["png"] = messages.compressed_depth(header, depths)
             if "points" in wanted:
                 rgb = None if seen.colours is None else messages.rgb(seen.colours, spec.encoding)
                 said["points"] = messages.cloud(header, self._lens, seen.depth, rgb)
-        for what, publisher in self._publishers.items():
-            if what in said:
-                publisher.publish(said[what], frozen=True)
+        return said
 
-    def _look(self, time_ns: int, colours: bool, depth: bool) -> Seen | None:
+    def _seen(self, look: Callable[[], T]) -> T | None:
         """Return what it sees; None: nothing can be drawn here, which is told once."""
         if self._is_blind:
             return None
         try:
-            return self.sensor.look(time_ns, colours=colours, depth=depth)
+            return look()
         except SimulationError as error:
             if self._need == "required" or (self._need is None and self._is_needed):
                 raise

@@ -28,7 +28,7 @@ def picture_entity(topic: str) -> str:
 
 
 class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
-    """sensor_msgs/CompressedImage: JPEG and PNG, at the recording's own rate."""
+    """sensor_msgs/CompressedImage: JPEG and PNG, at the recording's own rate; no packed depths."""
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         """Hang the picture before its camera, if the robot has one of that topic."""
@@ -43,7 +43,8 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
     def take(self, sample: Sample[Any]) -> None:
         """Keep a picture that is due."""
         period, message = self.context.images_period, sample.message
-        kind = next((kind for kind in ("jpeg", "png") if kind in message.format), None)
+        packed = "compressedDepth" in message.format
+        kind = next((kind for kind in ("jpeg", "png") if kind in message.format and not packed), None)
         if period is None or kind is None or sample.time_ns < self._next_ns:
             return
         self._next_ns = next_due(period, sample.time_ns)

@@ -180,9 +180,11 @@ def _cameras(context: StackContext) -> list[CameraPublisher]:
     if not cameras or need == "off":
         return []
     from twin.nodes.cameras.camera import CameraPublisher
+    from twin.nodes.cameras.truth import TruthPublisher
 
     description, namespace = context.handle.description, context.hardware_namespace
+    kinds = [TruthPublisher if camera.spec.truth else CameraPublisher for camera in cameras]
     return [
-        CameraPublisher(context.bus, camera, description, namespace=namespace, need=need)
-        for camera in cameras
+        kind(context.bus, camera, description, namespace=namespace, need=need)
+        for kind, camera in zip(kinds, cameras, strict=True)
     ]

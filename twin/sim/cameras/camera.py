@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from twin.models.specs import CameraSpec
 from twin.sim.cameras.depth_noise import noisy
+from twin.sim.cameras.labels import Labels
 from twin.sim.cameras.remap import Source
 from twin.sim.sensors import Mount
 
@@ -52,7 +53,8 @@ class Camera:
         Raises:
             SimulationError: Nothing can be drawn on this computer.
         """
-        _ = self.mount.world.eyes
+        world = self.mount.world
+        _ = world.eyes if self.spec.truth is None else world.true_eyes
 
     def look(self, time_ns: int, *, colours: bool = True, depth: bool = False) -> View:
         """Return what it sees; `time_ns` is the world's time.
@@ -75,6 +77,23 @@ class Camera:
                 grain = self._depth_noise.normal(tick, distance.size).reshape(distance.shape)
                 distance = noisy(distance, spec.depth_noise, spec.lens.focal_length, grain)
         return View(seen, distance)
+
+    @property
+    def labels(self) -> Labels:
+        """What the numbers of `things` mean.
+
+        Raises:
+            SimulationError: Nothing can be drawn on this computer.
+        """
+        return self.mount.world.true_eyes.labels
+
+    def things(self) -> NDArray[np.uint16]:
+        """Return the number of the thing that each pixel shows now, shape (height, width).
+
+        Raises:
+            SimulationError: Nothing can be drawn on this computer.
+        """
+        return self.source.nearest(self.mount.world.true_eyes.things(self), nothing=0)
 
     def _encoded(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         if self.spec.encoding == "mono8":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -31,25 +32,23 @@ class Eyes:
     wants them: with all that an image takes thirty times as long without a graphics card.
     """
 
-    def __init__(self, world: World) -> None:
-        """Compile what is seen, and open a canvas.
+    def __init__(self, world: World, spec: mujoco.MjSpec, cameras: Sequence[Camera]) -> None:
+        """Compile what the cameras see of a world, and open a canvas.
 
         Raises:
             SimulationError: Nothing can be drawn on this computer.
         """
-        cameras = [camera for robot in world.robots.values() for camera in robot.cameras]
         sizes = np.array([camera.source.size for camera in cameras])
-        spec = world.spec_to_see()
         spec.visual.global_.offwidth, spec.visual.global_.offheight = map(int, sizes.max(axis=0))
         spec.visual.quality.offsamples = 0
         spec.visual.quality.shadowsize = SHADOW_SIZE if world.scene.shadows else 0
         for number, camera in enumerate(cameras):
             add_camera(spec.body(camera.mount.body), f"camera {number}", camera.spec, camera.source.size)
-        self._world, self._model = world, spec.compile()
-        self._data = mujoco.MjData(self._model)
-        self._canvas = Canvas(self._model, *map(int, sizes.max(axis=0)))
+        self._world, self.model = world, spec.compile()
+        self._data = mujoco.MjData(self.model)
+        self._canvas = Canvas(self.model, *map(int, sizes.max(axis=0)))
         self._process = os.getpid()
-        self._scene = mujoco.MjvScene(self._model, self._model.ngeom + 100)
+        self._scene = mujoco.MjvScene(self.model, self.model.ngeom + 100)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = world.scene.shadows
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
         self._options = mujoco.MjvOption()
@@ -71,12 +70,7 @@ class Eyes:
         Raises:
             SimulationError: The process is a fork of the one that opened the canvas.
         """
-        if os.getpid() != self._process:
-            raise SimulationError("a fork of a run has no OpenGL, and its cameras see nothing")
-        self._take_state()
-        near, far = camera.spec.near, camera.spec.far
-        clip, extent = self._model.vis.map, self._model.stat.extent
-        clip.znear, clip.zfar = near / extent, far / extent
+        near, far = self._turn_to(camera)
         self.drawn += colours + depth
         size, seen, distances = camera.source.size, _NO_COLOURS, _NO_DEPTH
         if colours:
@@ -87,19 +81,45 @@ class Eyes:
             distances = _metres(self._canvas.nearness(self._scene, *size), near, far)
         return seen, distances
 
+    def geoms(self, camera: Camera) -> NDArray[np.intp]:
+        """Return the geom that each pixel of the source shows, shape (height, width); -1 where none is.
+
+        Raises:
+            SimulationError: The process is a fork of the one that opened the canvas.
+        """
+        self._turn_to(camera)
+        self.drawn += 1
+        self._update(camera, paint=True)
+        numbers = self._canvas.numbers(self._scene, *camera.source.size)
+        shown = np.full(self._scene.ngeom + 1, -1, np.intp)
+        for geom in self._scene.geoms[: self._scene.ngeom]:
+            if geom.segid >= 0 and geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:
+                shown[geom.segid + 1] = geom.objid
+        return shown[numbers]
+
     def close(self) -> None:
         """Free what the graphics driver holds. Harmless when repeated."""
         self._canvas.close()
+
+    def _turn_to(self, camera: Camera) -> tuple[float, float]:
+        """Have the world as it is now between the clipping planes [m] of a camera; return those."""
+        if os.getpid() != self._process:
+            raise SimulationError("a fork of a run has no OpenGL, and its cameras see nothing")
+        self._take_state()
+        near, far = camera.spec.near, camera.spec.far
+        clip, extent = self.model.vis.map, self.model.stat.extent
+        clip.znear, clip.zfar = near / extent, far / extent
+        return near, far
 
     def _update(self, camera: Camera, *, paint: bool) -> None:
         """Have what is to be drawn; what is paint only has no depth, as it is nothing to rays."""
         self._options.geomgroup[GROUP_PAINT] = paint
         view, everything = self._views[id(camera)], mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(self._model, self._data, self._options, None, view, everything, self._scene)
+        mujoco.mjv_updateScene(self.model, self._data, self._options, None, view, everything, self._scene)
 
     def _take_state(self) -> None:
         """Have everything where it is in the world."""
-        world, data, model = self._world, self._data, self._model
+        world, data, model = self._world, self._data, self.model
         if self._step == world.step_count:
             return
         self._step = world.step_count
@@ -112,7 +132,7 @@ class Eyes:
     def _view(self, number: int) -> mujoco.MjvCamera:
         view = mujoco.MjvCamera()
         view.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        view.fixedcamid = self._model.camera(f"camera {number}").id
+        view.fixedcamid = self.model.camera(f"camera {number}").id
         return view
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.models.lens import Lens
 
+T = TypeVar("T", np.float32, np.uint16)
 _WIDEST = 2.0
 """How much larger than the camera's image the drawn one may be, each way."""
 
@@ -54,10 +56,10 @@ class Source:
         image[self._unseen] = 0
         return image
 
-    def nearest(self, drawn: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return an image of depths, nan where the lens sees nothing: none lies between two things."""
+    def nearest(self, drawn: NDArray[T], nothing: float = np.nan) -> NDArray[T]:
+        """Return an image of depths or numbers, `nothing` where the lens sees none: none lies between two."""
         if self._is_same:
             return drawn
         image = drawn.ravel()[self._nearest]
-        image[self._unseen] = np.nan
+        image[self._unseen] = nothing
         return image
