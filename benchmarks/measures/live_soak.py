@@ -1,8 +1,9 @@
 """A mirror beside a robot that is moved by hand, stopped, slowed down, killed and started again, and again.
 
 The robot is `twin plant` in a process of its own, its autonomy and mission run in the mirror. What was done
-to it, and when, is known here only; printed are what the mirror told within 15 s of it, how often its label
-was another one than it ought to be, second by second, and its memory.
+to it, and when, is known here only; printed are what the mirror told from then on until the next thing was
+done, how often its label was another one than it ought to be, second by second, how often it put the virtual
+robot elsewhere, and its memory.
 
 python -m benchmarks.measures.live_soak --minutes 60
 """
@@ -24,7 +25,6 @@ SCENARIO = Path(__file__).parents[2] / "scenarios" / "warehouse_patrol.yaml"
 ROUND_S = 300.0
 KIDNAPPED_S, STOPPED_S, SLOWED_S, KILLED_S, AGAIN_S = 90.0, 150.0, 210.0, 280.0, 296.0
 """When, in a round; the robot is there some seconds after it was started."""
-TOLD_S = 15.0
 MOST = 300
 """Letters of a line."""
 EARLY_S = 6.0
@@ -108,13 +108,17 @@ def soak(minutes: float) -> None:
 
         mirror.advance(tick)
     robot.kill()
-    for at_s, what in done:
-        words = [text for told_s, text in told if at_s - EARLY_S <= told_s < at_s + TOLD_S]
+    begins = [at_s - EARLY_S for at_s, _ in done] + [minutes * 60.0]
+    for (at_s, what), since_s, until_s in zip(done, begins, begins[1:], strict=False):
+        words = [text for told_s, text in told if since_s <= told_s < until_s]
         print(f"{at_s:7.1f} s  {what:10} {'; '.join(dict.fromkeys(words)) or 'NOTHING TOLD'}"[:MOST])
     wrong = [
         (at_s, label, want) for at_s, label in seconds if (want := expected(at_s, done)) and label != want
     ]
     print(f"label: {len(seconds)} s, wrong in {len(wrong)}: {wrong[:20]}")
+    resets = [text for _, text in told if text.startswith("reset: ")]
+    lost = sum(text.startswith("pace: ") for _, text in told)
+    print(f"put elsewhere {len(resets)} times, lost time {lost} times")
     print("memory [MB], a minute each:", " ".join(f"{each:.0f}" for each in memory))
 
 

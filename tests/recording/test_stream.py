@@ -44,6 +44,33 @@ def test_a_full_disk_is_told_and_not_waited_for(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+_FULL_BEFORE = """
+import pathlib, resource, sys
+import rerun.blueprint as rrb
+from twin.errors import RecordingError
+from twin.recording.stream import open_recording
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+try:
+    open_recording(pathlib.Path(sys.argv[1]), "twin", "run", rrb.Blueprint(rrb.Spatial3DView()))
+except RecordingError as fault:
+    print(fault)
+"""
+
+
+def test_a_disk_that_is_full_before_the_run_is_told_and_not_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    done = subprocess.run(
+        [sys.executable, "-c", _FULL_BEFORE, str(path)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.stdout == f"{path}: the recording could not be written to its end; is the disk full?\n"
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_no_index_grows_with_the_run(tmp_path: Path) -> None:
     """Rerun would keep that of a footer in memory: 60 MB in ten minutes of a warehouse."""
     recording = open_recording(tmp_path / "a.rrd", "twin", "run", rrb.Blueprint())

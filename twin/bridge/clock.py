@@ -28,6 +28,11 @@ class Clock:
     is_simulated: ClassVar[bool] = True
     """Whether others are told of it on `/clock`."""
 
+    @property
+    def steady_ns(self) -> int:
+        """For durations: as `now_ns`, but never set [ns]."""
+        return self.now_ns
+
     def now(self) -> Instant:
         """Return the present time; `clock.now().to_msg()` is a stamp."""
         return Instant(self.now_ns)

@@ -60,7 +60,7 @@ class JointTrajectoryControllerNode:
             return
         self._messages += 1
         trajectory = self._as_told(names, message.points)
-        self._told = self.node.now_ns, trajectory
+        self._told = self.node.steady_ns, trajectory
         self.node.create_task(self._follow(self._messages, names, trajectory))
 
     def _as_told(self, names: list[str], points: Sequence[JointTrajectoryPoint]) -> Trajectory:
@@ -81,7 +81,7 @@ class JointTrajectoryControllerNode:
         """Return positions and velocities that joints are to have now: as told, else as measured."""
         since, told = self._told
         if told is not None and told.joint_names == tuple(names):
-            elapsed = (self.node.now_ns - since) * 1e-9
+            elapsed = (self.node.steady_ns - since) * 1e-9
             if elapsed <= told.duration + 1e-9:
                 before = told.sample(elapsed - _DERIVED_S)
                 here = told.sample(elapsed)
@@ -90,9 +90,9 @@ class JointTrajectoryControllerNode:
         return reading.position[index], reading.velocity[index]
 
     def _follow(self, message: int, names: list[str], trajectory: Trajectory) -> Generator[None, None, None]:
-        start = self.node.now_ns
+        start = self.node.steady_ns
         while message == self._messages:
-            elapsed = (self.node.now_ns - start) * 1e-9
+            elapsed = (self.node.steady_ns - start) * 1e-9
             self._command(names, trajectory.sample(elapsed))
             if elapsed >= trajectory.duration:
                 return
@@ -107,8 +107,8 @@ class JointTrajectoryControllerNode:
         trajectory = self._with_start(names, goal.request.trajectory.points)
         self._messages += 1  # what a message said is over
         self._told = (0, None)
-        mine, start = self._messages, self.node.now_ns
-        while (elapsed := (self.node.now_ns - start) * 1e-9) < trajectory.duration:
+        mine, start = self._messages, self.node.steady_ns
+        while (elapsed := (self.node.steady_ns - start) * 1e-9) < trajectory.duration:
             if goal.is_cancel_requested:
                 goal.canceled()
                 return _result(_SUCCESSFUL, "canceled")
@@ -143,7 +143,7 @@ class JointTrajectoryControllerNode:
     def _settle(
         self, goal: GoalHandle, names: list[str], trajectory: Trajectory
     ) -> Generator[None, None, Any]:
-        deadline = self.node.now_ns + _PATIENCE_NS
+        deadline = self.node.steady_ns + _PATIENCE_NS
         while True:
             measured = self._hardware.read().position
             errors = {
@@ -153,7 +153,7 @@ class JointTrajectoryControllerNode:
             worst = max(errors, key=lambda name: abs(errors[name]))
             if abs(errors[worst]) <= _TOLERANCE:
                 return _result(_SUCCESSFUL)
-            if self.node.now_ns > deadline:
+            if self.node.steady_ns > deadline:
                 goal.abort()
                 said = f"'{worst}' is {errors[worst]:+.4f} away from its goal, {_TOLERANCE} is allowed"
                 return _result(_GOAL_TOLERANCE_VIOLATED, said)

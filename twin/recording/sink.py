@@ -161,7 +161,6 @@ class RerunSink:
         from twin.recording.shapes import declare_decals, declare_shapes
         from twin.recording.stream import declare_frames, open_recording
 
-        self._world = world
         shapes = world.shapes()
         frames = Frames(world.body_names)
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
@@ -180,6 +179,7 @@ class RerunSink:
             [world.body_names.index(box.base) for box in self._robots],
             self._config.move_tolerance,
         )
+        self._world = world
         self._sources.append(self._poses)
         self._context: Context = Context(
             recording=self._recording,

@@ -87,6 +87,8 @@ def open_recording(
             raise RecordingError(
                 f"{target}: cannot write the recording: {error.strerror}; choose another folder"
             ) from error
+        if not _has_room(target.parent):  # for its writer Rerun would wait for ever
+            raise _not_whole(target)
     if screen is None:
         recording = without_clock(rr.RecordingStream, application_id, recording_id)
     else:

@@ -19,7 +19,9 @@ from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics
 
 import twin
 from tests.envs.scenario.conftest import MakeEnv
+from twin.envs.scenario.agents.drive import Drive
 from twin.envs.scenario.env import ScenarioEnv
+from twin.envs.scenario.rewards import TERMS, Term
 from twin.errors import GymError
 
 TUNE = {"parameters": {"controller_server:FollowPath.desired_linear_vel": (0.1, 0.4)}}
@@ -182,6 +184,14 @@ def test_what_an_environment_is_made_of_can_be_pickled(make: MakeEnv, small: Pat
         ({"agent": int}, "there is no agent '<class 'int'>'; "),
         ({"agent": ["drive"]}, r"there is no agent '\['drive'\]'"),
         ({"reward": {"prgress": 1}}, "there is no reward 'prgress'; did you mean 'progress'?"),
+        ({"reward": {"progress": "much"}}, "the reward 'progress' has the weight 'much'; valid is a finite"),
+        ({"reward": {"progress": float("nan")}}, "has the weight nan; valid is a finite number"),
+        ({"reward": ["progress"]}, "valid are names of terms with weights"),
+        ({"observe": "/scan"}, "observe='/scan': valid is a list of topics or channels"),
+        ({"observe": [5]}, "valid is a list of topics or channels"),
+        ({"overrides": 5}, "overrides=5: valid are keys of the scenario with values"),
+        ({"robot": 5}, "robot=5: valid is the name"),
+        ({"agent": "tune", "parameters": 3}, "the agent tune has no parameters; valid is"),
         ({"ticks": 0}, "ticks=0: valid is a whole number of control periods, 1 or more"),
         ({"ticks": 1.5}, "ticks=1.5: valid"),
         ({"robot": "b"}, "the scenario 'small' has no robot 'b'"),
@@ -193,6 +203,29 @@ def test_a_mistake_is_one_sentence(small: Path, options: dict[str, Any], said: s
     with pytest.raises(twin.TwinError, match=said) as raised:
         twin.make_env(small, **options)
     assert len(str(raised.value).splitlines()) == 1
+
+
+def test_what_is_wrong_in_a_term_or_agent_of_ones_own_is_told_with_its_line(
+    small: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Cold(Term):
+        def value(self) -> float:
+            raise ValueError("too cold")
+
+    class Lazy(Drive):
+        def act(self, action: Any) -> None:
+            raise ZeroDivisionError
+
+    monkeypatch.setitem(TERMS, "cold", Cold)
+    for options, said in (
+        ({"reward": {"cold": 1.0}}, r"test_env\.py:\d+: the reward of Cold fails: ValueError: too cold"),
+        ({"agent": Lazy}, r"test_env\.py:\d+: act of Lazy fails: ZeroDivisionError"),
+    ):
+        env = twin.make_env(small, **options)
+        env.reset()
+        with pytest.raises(GymError, match=said):
+            env.step(env.action_space.sample())
+        env.close()
 
 
 @pytest.mark.parametrize(

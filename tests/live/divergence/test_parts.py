@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,6 +110,28 @@ def test_a_scan_is_explained_from_a_place_near_by_and_when_turned() -> None:
     assert seen.explained == 1.0
     assert seen.residual < 0.05
     assert not seen.things
+
+
+@pytest.mark.parametrize("increment", [1.0, -1.0])
+@pytest.mark.parametrize("bias", [0.0, 0.3, -0.1])
+def test_what_all_rays_measure_too_much_is_told_from_a_place_that_is_wrong(
+    bias: float, increment: float
+) -> None:
+    expected, measured = room(0.0, 0.0, 0.0), room(0.2, 0.1, 0.05, box=True)
+    order = slice(None) if increment > 0.0 else slice(None, None, -1)
+    measured = replace(
+        measured,
+        angle_min=measured.angles[order][0],
+        angle_increment=increment * measured.angle_increment,
+        ranges=measured.ranges[order] + bias,
+    )
+    assert compare(expected, measured, Pose2(0.0, 0.0, 0.0)).offset == pytest.approx(bias, abs=0.03)
+
+
+def test_a_lidar_that_sees_no_ray_and_its_opposite_tells_no_bias() -> None:
+    expected = room(0.0, 0.0, 0.0)
+    half = replace(expected, angle_min=-1.0, ranges=room(0.0, 0.0, math.pi - 1.0).ranges[:114] + 0.3)
+    assert compare(expected, half, Pose2(0.0, 0.0, 0.0)).offset == 0.0
 
 
 def test_what_is_there_and_what_is_gone_are_things_at_their_places() -> None:

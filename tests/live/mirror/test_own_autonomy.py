@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from tests.live.beside import Beside, plant
+from twin.bridge.msgs import Twist
 from twin.live.mirror.mirror import Mirror
 from twin.scenario.schema import load
 
@@ -50,3 +52,37 @@ def test_it_is_a_shadow_because_nothing_commands_it_from_here_and_its_mission_is
     assert max(errors[100:]) < 0.05
     assert any(state.startswith(mission) for state in states), states
     assert status.resets == 0
+
+
+def test_autonomy_here_drives_a_robot_on_that_starts_again_by_a_clock_far_behind() -> None:
+    """In the middle of a goal: what waits for a time must not wait until the clock shows it again."""
+    scenario = load("warehouse_patrol", PATROL | {"mission.max_failed": "1000"})
+    robots = plant(scenario)
+    cable = Beside(robots)
+    with Mirror(scenario, cable, autonomy="all") as mirror:
+        world = mirror.run.run.world
+        speeds: list[float] = []
+        node = mirror.run.run.bus.create_node("listener")
+        node.create_subscription(Twist, "/cmd_vel", lambda told: speeds.append(abs(told.linear.x)), 10)
+
+        def go_on(seconds: float, until: Callable[[], bool] = lambda: False) -> None:
+            end_ns = world.time_ns + round(seconds * 1e9)
+            mirror.advance(lambda: world.time_ns >= end_ns or until())
+
+        go_on(4.0)
+        assert mirror.statuses()[0].judgement.label == "twin"
+        cable.kill(robots)
+        go_on(1.5)
+        again = plant(scenario, "clock_offset=-74.5s")
+        cable.start(again)
+        physical = again.run.run.world
+        (base,) = (robot.base for robot in physical.robots.values())
+        start = physical.pose(base).to_pose2()
+
+        def is_a_twin_again() -> bool:
+            is_twin = mirror.statuses()[0].judgement.label == "twin"
+            return is_twin and physical.pose(base).to_pose2().distance(start) > 1.0
+
+        go_on(25.0, is_a_twin_again)
+        assert is_a_twin_again()
+        assert max(speeds) <= 1.0, "no command is beyond what the robot can do"

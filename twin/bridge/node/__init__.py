@@ -96,6 +96,11 @@ class Node(NodeParameters, NodeGraph):
         """Simulated time [ns]."""
         return self.bus.clock.now_ns
 
+    @property
+    def steady_ns(self) -> int:
+        """For durations: simulated time that goes on where a clock that is followed is set [ns]."""
+        return self.bus.clock.steady_ns
+
     def get_clock(self) -> Clock:
         """Return the bus's clock."""
         return self.bus.clock

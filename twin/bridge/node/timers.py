@@ -75,6 +75,28 @@ class Timer:
         self.due_ns = next_due(self.period_ns, now_ns)
 
 
+class Beat:
+    """When something in an execution is due next; goes on as before where the clock is set."""
+
+    def __init__(self, clock: Clock) -> None:
+        """Be due now."""
+        self._clock, self._due_ns = clock, clock.steady_ns
+
+    @property
+    def late_ns(self) -> int:
+        """How long it has been due [ns]; negative: it is not yet."""
+        return self._clock.steady_ns - self._due_ns
+
+    @property
+    def due_ns(self) -> int:
+        """When it is due, to be yielded [ns]."""
+        return self._clock.now_ns - self.late_ns
+
+    def put_off(self, by_ns: int) -> None:
+        """Be due so much later than it was."""
+        self._due_ns += by_ns
+
+
 class Rate:
     """Sleeps to the next multiple of a period in executions: `yield from rate.sleep()`."""
 

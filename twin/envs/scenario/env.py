@@ -16,6 +16,7 @@ from twin.envs.scenario.agents.agent import Agent, Values
 from twin.envs.scenario.episode import Episode
 from twin.envs.scenario.observations import Channel
 from twin.envs.scenario.observer import Observer
+from twin.envs.scenario.own_code import blamed
 from twin.envs.scenario.rewards import Reward, require_terms
 from twin.envs.scenario.screen import Screen
 from twin.errors import GymError, nearest
@@ -70,10 +71,13 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
             raise GymError(f"scenario is {scenario!r}; valid: scenario=... with the name or file of one")
         self._kind = agent_of(agent)
         self._config = config_of(self._kind, settings)
+        if not isinstance(robot, str | None):
+            raise GymError(f"robot={robot!r}: valid is the name of one of the scenario's")
+        if not isinstance(overrides, Mapping):
+            raise GymError(f"overrides={overrides!r}: valid are keys of the scenario with values")
         self._file, self._overrides = scenario, dict(overrides)
         self._robot, self._wanted = robot, observe
-        self._weights = dict(self._kind.rewards if reward is None else reward)
-        require_terms(self._weights)
+        self._weights = require_terms(self._kind.rewards if reward is None else reward)
         self._ticks = self._kind.ticks if ticks is None else ticks
         if not (isinstance(self._ticks, int) and self._ticks >= min(1, self._kind.ticks)):
             raise GymError(f"ticks={ticks!r}: valid is a whole number of control periods, 1 or more")
@@ -147,7 +151,9 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         episode = self._episode
         if episode is None or self._over:
             raise GymError("the run is over, or has not begun; call reset()")
-        self._agent.act(self._checked(action))
+        checked = self._checked(action)
+        with blamed(self._kind, "act"):
+            self._agent.act(checked)
         self._advance(self._ticks)
         self._over = episode.over
         terms = self._reward.terms()
@@ -206,10 +212,12 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
         self._end()
         self._over = False
         with uncollected():
-            prepared = self._kind.prepared(scenario, self._config)
+            with blamed(self._kind, "prepared"):
+                prepared = self._kind.prepared(scenario, self._config)
             self._episode = episode = Episode(prepared, self._robot, ticks=self._ticks, screen=screen)
             try:
-                self._agent = self._kind(episode, self._config)
+                with blamed(self._kind, "the beginning"):
+                    self._agent = self._kind(episode, self._config)
                 self._observer = Observer(episode, self._agent, self._wanted)
             except BaseException:
                 self._end()
@@ -296,4 +304,7 @@ def config_of(kind: type[Agent], settings: Mapping[str, Any]) -> Any:
         raise GymError(
             f"an environment of the agent {kind.__name__} needs the setting {', '.join(needed)}=..."
         )
-    return kind.Config(**settings)
+    try:
+        return kind.Config(**settings)
+    except (TypeError, ValueError) as error:
+        raise GymError(f"the settings of the agent {kind.__name__} are refused: {error}") from error

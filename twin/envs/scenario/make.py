@@ -52,7 +52,9 @@ def make_env(
     Raises:
         TwinError: The scenario cannot be run, or is no environment for this agent.
     """
-    options = locals() | {"overrides": dict(overrides)}  # a proxy could not be told to another process
+    if isinstance(overrides, Mapping):
+        overrides = dict(overrides)
+    options = locals()  # a proxy could not be told to another process
     options |= options.pop("settings")
     made = ScenarioEnv(**options)
     made.spec = replace(gym.spec(SCENARIO), kwargs=options)

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from twin.envs.scenario.agents.agent import Agent, Values
 from twin.envs.scenario.episode import Episode, Heard
 from twin.envs.scenario.observations import Channel, Costmap, Odometry, PoseInMap, Poses, Scan
+from twin.envs.scenario.own_code import blamed
 from twin.errors import GymError
 
 OLDEST_S = 10.0
@@ -43,6 +44,11 @@ class Observer:
             GymError: A topic that is not there, or whose type nothing shows.
         """
         self._episode, self._agent = episode, agent
+        if isinstance(wanted, str) or not (
+            wanted is None
+            or (isinstance(wanted, Sequence) and all(isinstance(each, str | Channel) for each in wanted))
+        ):
+            raise GymError(f"observe={wanted!r}: valid is a list of topics or channels")
         if wanted is None:
             wanted = [topic for topic in agent.observes if episode.publishes(topic)]
         self.channels = tuple(
@@ -66,10 +72,12 @@ class Observer:
         found: dict[str, Values] = {}
         for channel, heard in zip(self.channels, self._heard, strict=True):
             if heard.message is not None:
-                found[channel.key] = channel.values(heard.message, episode)
+                with blamed(type(channel), "the channel"):
+                    found[channel.key] = channel.values(heard.message, episode)
         if self.channels:
             found["age"] = np.array([heard.age(now) for heard in self._heard])
-        found |= self._agent.observe()
+        with blamed(type(self._agent), "observe"):
+            found |= self._agent.observe()
         return {key: _within(found.get(key), box) for key, box in self.space.spaces.items()}
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 from twin.envs.scenario.episode import Episode
+from twin.envs.scenario.own_code import blamed
 from twin.errors import GymError, nearest
 
 
@@ -123,19 +125,31 @@ class Reward:
     """A weighted sum of terms."""
 
     def __init__(self, episode: Episode, weights: Mapping[str, float]) -> None:
-        self._terms = {name: (weight, TERMS[name](episode)) for name, weight in weights.items()}
+        self._terms: dict[str, tuple[float, Term]] = {}
+        for name, weight in weights.items():
+            with blamed(TERMS[name], "the reward"):
+                self._terms[name] = weight, TERMS[name](episode)
 
     def terms(self) -> dict[str, float]:
         """Return what each term gives for the last step, with its weight."""
-        return {name: weight * term.value() for name, (weight, term) in self._terms.items()}
+        found = {}
+        for name, (weight, term) in self._terms.items():
+            with blamed(type(term), "the reward"):
+                found[name] = weight * float(term.value())
+        return found
 
 
-def require_terms(weights: Mapping[str, float]) -> None:
-    """Check the names of terms.
+def require_terms(weights: object) -> dict[str, float]:
+    """Return the weights of terms.
 
     Raises:
-        GymError: One is not known.
+        GymError: They are none, or a term is not known.
     """
-    for name in weights:
+    if not isinstance(weights, Mapping):
+        raise GymError(f"reward={weights!r}: valid are names of terms with weights, as {{'progress': 1.0}}")
+    for name, weight in weights.items():
         if name not in TERMS:
-            raise GymError(f"there is no reward '{name}'; {nearest(name, TERMS)}")
+            raise GymError(f"there is no reward '{name}'; {nearest(str(name), TERMS)}")
+        if not isinstance(weight, int | float) or not math.isfinite(weight):
+            raise GymError(f"the reward '{name}' has the weight {weight!r}; valid is a finite number")
+    return dict(weights)

@@ -21,6 +21,7 @@ THRESHOLDS = {
     "robot restarted": Threshold(on=0.0, off=0.0, for_s=0.0),  # [m]
     "odometry jump": Threshold(on=0.3, off=0.3, for_s=0.6),  # [m] or [rad]
     "blind lidar": Threshold(on=0.4, off=0.2, for_s=1.0),  # share of rays
+    "lidar bias": Threshold(on=0.05, off=0.03, for_s=4.0),  # [m]
     "obstacle not in the model": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
     "obstacle of the model is gone": Threshold(on=15.0, off=1.0, for_s=0.4),  # scans
     "localisation lost": Threshold(on=4.0, off=0.1, for_s=0.0),  # [s]
@@ -40,6 +41,10 @@ _LOCALISED_S = 4.0
 """For so long a robot has to be where it is thought to be, before what it sees is a thing there [s]."""
 _POSITION, _YAW, _EXPLAINED = 0.15, 0.15, 0.75
 """What two robots may differ by without a reason [m], [rad], and how much of a scan has to be explained."""
+_BESIDE = 0.05
+"""A lidar is judged by one that is no farther from it [m], [rad]."""
+_LARGEST_BIAS = 1.0
+"""What differs by more is seen from another place [m]."""
 _NIS = 3.0
 """The mean NIS may be so many times larger than by chance: localisation's covariance is an estimate, too."""
 
@@ -66,7 +71,7 @@ def _rules(evidence: Evidence) -> tuple[Callable[[Evidence], Iterator[Finding]],
         return (_blind,)
     if evidence.lost is not None:
         return (_blind, _kidnapped)
-    return (_blind, _things, _kidnapped, _slip, _wheels, _response)
+    return (_blind, _bias, _things, _kidnapped, _slip, _wheels, _response)
 
 
 def _link(evidence: Evidence) -> Iterator[Finding]:
@@ -147,6 +152,16 @@ def _blind(evidence: Evidence) -> Iterator[Finding]:
         )
     elif evidence.less is not None and evidence.less.is_carried and scan.longer > 0.05:
         yield _lidar(max(0.4, scan.longer), f"{scan.longer:.0%} of the rays, always the same, see too far")
+
+
+def _bias(evidence: Evidence) -> Iterator[Finding]:
+    scan = evidence.scan
+    if scan is None or scan.broke_s is not None or not _sees(evidence):
+        return
+    is_beside = max(evidence.position or 0.0, abs(evidence.yaw or 0.0)) < _BESIDE
+    if is_beside and abs(scan.offset) < _LARGEST_BIAS:
+        text = f"rays measure {scan.offset:+.2f} m more than they should, all around"
+        yield Finding(cause="lidar bias", number=abs(scan.offset), text=text)
 
 
 def _lidar(share: float, text: str) -> Finding:

@@ -25,6 +25,8 @@ class ScanEvidence:
     """Share of rays in which something was expected to."""
     residual: float = 0.0
     """Of the rays that are explained [m]."""
+    offset: float = 0.0
+    """By so much farther than expected rays end in general [m]."""
     localised_s: float = math.inf
     """For how long scans have shown what they should, but for single things [s]."""
     frozen: bool = False

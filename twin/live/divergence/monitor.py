@@ -595,8 +595,10 @@ class DivergenceMonitor:
         latest = [one for one in self._matches if 0 <= now_ns - one.stamp_ns < 2 * _SECOND_NS][-10:]
         if not latest:
             return None
-        table = np.array([(m.explained, m.shorter, m.longer, m.returned, m.expected) for m in latest])
-        explained, shorter, longer, returned, expected = np.median(table, axis=0).tolist()
+        table = np.array(
+            [(m.explained, m.shorter, m.longer, m.returned, m.expected, m.offset) for m in latest]
+        )
+        explained, shorter, longer, returned, expected, offset = np.median(table, axis=0).tolist()
         return ScanEvidence(
             explained=explained,
             shorter=shorter,
@@ -604,6 +606,7 @@ class DivergenceMonitor:
             returned=returned,
             expected=expected,
             residual=latest[-1].residual,
+            offset=offset,
             localised_s=math.inf if self._unsure_ns is None else (now_ns - self._unsure_ns) * 1e-9,
             frozen=self._frozen,
             unreadable=returned == 0.0 and shorter == longer == 0.0 and expected > 0.0,

@@ -12,6 +12,9 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from twin.geometry import Array, Pose2
 
+_LEAST_PAIRED = 0.2
+"""Share of a scan's rays of which the opposite ones have to be known."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ScanConfig:
@@ -71,6 +74,10 @@ class ScanMatch:
     longer: float
     residual: float
     """Median of what the explained rays differ [m]."""
+    offset: float
+    """How much farther than expected rays measure, explained or not: the median over pairs of opposite rays
+    of their mean [m]. A place that is a little wrong is nearer on one side and farther on the other; 0 if too
+    few are opposite each other."""
     returned: float
     """Share of all rays in which something returned."""
     expected: float
@@ -99,6 +106,7 @@ def compare(expected: Scan, measured: Scan, moved: Pose2, config: ScanConfig = S
     count = max(1, int(np.count_nonzero(known)))
     fits = known & returned & ~shorter & ~longer
     beside = np.abs(actual - middle)[fits]
+    farther = np.where(known & returned & (middle < longest), actual - middle, math.nan)
     things = [
         *_things("more", shorter, actual, measured.angles, config.least_rays),
         *_things("less", longer, low, measured.angles, config.least_rays),
@@ -109,10 +117,24 @@ def compare(expected: Scan, measured: Scan, moved: Pose2, config: ScanConfig = S
         shorter=float(np.count_nonzero(shorter)) / count,
         longer=float(np.count_nonzero(longer)) / count,
         residual=float(np.median(beside)) if len(beside) else math.nan,
+        offset=_offset(farther, measured.angle_increment),
         returned=float(np.mean(returned)),
         expected=float(np.mean(low < longest)),
         things=tuple(things),
     )
+
+
+def _offset(farther: Array, increment: float) -> float:
+    """Return by how much pairs of opposite rays are farther than expected; NaN where that is not known."""
+    count = len(farther)
+    rays = np.arange(count)
+    opposite = np.rint(
+        np.mod(math.pi + rays * increment, math.copysign(2.0 * math.pi, increment)) / increment
+    )
+    paired = opposite < count
+    pairs = (farther[rays[paired]] + farther[opposite[paired].astype(np.intp)]) / 2.0
+    pairs = pairs[np.isfinite(pairs)]
+    return float(np.median(pairs)) if len(pairs) > _LEAST_PAIRED * count else 0.0
 
 
 def _seen_from(scan: Scan, moved: Pose2, longest: float) -> tuple[Array, Array]:

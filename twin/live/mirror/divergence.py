@@ -40,6 +40,7 @@ _DOUBTS = (
     "odometry jump",
     "kidnapped",
     "localisation lost",
+    "lidar bias",
 )
 """Alarms that forbid to speak of a twin."""
 _TALKS_NS = 1_000_000_000

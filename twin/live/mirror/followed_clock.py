@@ -15,12 +15,12 @@ _SLEW = 0.01
 class FollowedClock(Clock):
     """Goes with simulated time, set and slewed towards another clock; a set clock may go back."""
 
-    __slots__ = ("_elapsed_ns", "_followed_ns", "_shift_ns")
+    __slots__ = ("_elapsed_ns", "_followed_ns", "_shift_ns", "_start_ns")
     is_simulated: ClassVar[bool] = False
 
     def __init__(self, start_ns: int) -> None:
         """Start at a time of day [ns]."""
-        self._shift_ns = start_ns
+        self._start_ns = self._shift_ns = start_ns
         self._elapsed_ns = self._followed_ns = 0
 
     @property
@@ -31,6 +31,11 @@ class FollowedClock(Clock):
     @now_ns.setter
     def now_ns(self, elapsed_ns: int) -> None:
         self._elapsed_ns = elapsed_ns
+
+    @property
+    def steady_ns(self) -> int:
+        """What it would show if nothing were followed [ns]."""
+        return self._elapsed_ns + self._start_ns
 
     def follow(self, other_ns: int, bound_ns: int) -> int:
         """Take what the other clock shows now; return by how much ours had to be set [ns], 0 if slewing does.

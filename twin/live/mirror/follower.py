@@ -35,6 +35,9 @@ class FollowerConfig:
     settled_ns: int = 2_000_000_000
     """... if that one has been found there for so long: localisation that looks for a robot finds it at more
     than one place."""
+    patience_ns: int = 3_000_000_000
+    """A robot that drove there while the virtual one was left behind, as by a computer that was too slow, is
+    followed by corrections for so long before."""
     step: float = 0.1
     """A robot that is found so much farther on [m] than it can have driven is found elsewhere ..."""
     fastest: float = 3.0
@@ -78,17 +81,23 @@ class Follower:
         self._wanted = _STILL
         self._jumps = False
         self._noted: deque[_Noted] = deque()
-        self._found: tuple[int, Pose2] | None = None
-        """When, and where, the physical robot was seen last."""
+        self._found: tuple[int | None, Pose2] | None = None
+        """When, None if by another clock, and where the physical robot was seen last."""
         self._settled_ns = 0
         """Since when it has been where it can have driven."""
         self._waits = False
         """Whether it is far away, but not settled there."""
+        self._leapt = True
+        """Whether it has been found where it cannot have driven since it was near."""
+        self._near_ns: int | None = None
+        """When it was near last, or far first."""
 
     def forget(self) -> None:
         """Forget where the robots were: what comes is stamped by another clock."""
         self._noted.clear()
-        self._found = None
+        self._near_ns = None
+        if self._found is not None:
+            self._found = None, self._found[1]
 
     def note(self, stamp_ns: int, virtual: Pose2) -> None:
         """Remember where the virtual robot is; times may not go back."""
@@ -106,7 +115,7 @@ class Follower:
 
         If it is farther away than `reset_distance`, the next step goes all the way once it has settled there,
         where something else than localisation, if there is any, did not doubt it; until then the virtual
-        robot is left where it drives.
+        robot is left where it drives. If it drove there, corrections are tried first.
         """
         self._settle(stamp_ns, physical, is_doubted=is_doubted)
         virtual, claimed = self.virtual_at(stamp_ns), self._at(stamp_ns, lambda noted: noted.claimed)
@@ -121,18 +130,26 @@ class Follower:
             prediction=claimed.distance(physical),
         )
         is_far = difference.position > self.config.reset_distance
-        self._jumps = is_far and stamp_ns - self._settled_ns >= self.config.settled_ns
-        self._waits = is_far and not self._jumps
+        self._leapt = self._leapt and is_far
+        if self._near_ns is None or not is_far:
+            self._near_ns = stamp_ns
+        has_settled = stamp_ns - self._settled_ns >= self.config.settled_ns
+        is_followed = not self._leapt and stamp_ns - self._near_ns < self.config.patience_ns
+        self._jumps = is_far and has_settled and not is_followed
+        self._waits = is_far and self._leapt and not has_settled
         return difference
 
     def _settle(self, stamp_ns: int, physical: Pose2, *, is_doubted: bool) -> None:
         found, self._found = self._found, (stamp_ns, physical)
-        if found is not None and not is_doubted:
-            elapsed_ns = abs(stamp_ns - found[0])  # after a silence it may be anywhere, and another one
-            most = self.config.step + self.config.fastest * elapsed_ns * 1e-9
-            if elapsed_ns < self.config.settled_ns and found[1].distance(physical) <= most:
-                return
-        self._settled_ns = stamp_ns
+        step = math.inf if found is None or is_doubted else found[1].distance(physical)
+        if found is None or found[0] is None:
+            self._settled_ns = stamp_ns
+            self._leapt |= step > self.config.reset_distance
+            return
+        elapsed_ns = abs(stamp_ns - found[0])  # after a silence it may be anywhere, and another one
+        most = self.config.step + self.config.fastest * elapsed_ns * 1e-9
+        if elapsed_ns >= self.config.settled_ns or step > most:
+            self._settled_ns, self._leapt = stamp_ns, True
 
     def _at(self, stamp_ns: int, pose: Callable[[_Noted], Pose2]) -> Pose2 | None:
         """Return a pose between those that are remembered, None outside of them."""

@@ -38,7 +38,7 @@ class TreeContext:
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         self.now_ns = now_ns
-        """Simulated time [ns]."""
+        """Simulated time, for durations [ns]."""
         self.on_transition: Callable[[TreeNode, Status, Status], None] = lambda node, before, now: None
         """Told of every change of a node's status."""
         self.on_recovery: Callable[[str], None] = lambda name: None

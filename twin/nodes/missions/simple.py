@@ -76,13 +76,13 @@ class VelocityProfileNode(MissionNode):
         for duration, linear, angular in steps:
             end += round(duration * 1e9)
             self._ends.append((end, linear, angular))
-        self._start = self._due_ns = next_due(PERIOD_NS, self.node.now_ns)
+        self._start = self._due_ns = next_due(PERIOD_NS, self.node.steady_ns)
         self._step = -1
         self._commands = self.node.create_publisher(Twist, "cmd_vel", 10)
         self.node.create_timer(control_period_ns, self._update)
 
     def _update(self) -> None:
-        now = self.node.now_ns
+        now = self.node.steady_ns
         elapsed = now - self._start
         if self.done or elapsed < 0:
             return

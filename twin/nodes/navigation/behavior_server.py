@@ -12,6 +12,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Empty, Twist, duration, new, ns
 from twin.bridge.node.tasks import Steps
+from twin.bridge.node.timers import Beat
 from twin.bridge.types import ActionType
 from twin.geometry import Pose2
 from twin.navigation import recovery
@@ -151,29 +152,29 @@ class BehaviorServerNode:
             if not served.is_valid(handle.request):
                 return _aborted(handle, name, served, _Failed(_INVALID_INPUT))
             behavior = served.make(handle.request)
-            started = due = self.node.now_ns
+            started, beat = self.node.steady_ns, Beat(self.node.get_clock())
             try:
                 while True:
                     if handle.is_cancel_requested:
                         handle.canceled()
                         return new(served.action.Result, error_msg="canceled")
-                    if self.node.now_ns < due:
-                        yield due
+                    if beat.late_ns < 0:
+                        yield beat.due_ns
                         continue
                     pose = self._robot_pose.in_odom()
-                    if pose is None and self.node.now_ns - due > _POSE_TIMEOUT_NS:
+                    if pose is None and beat.late_ns > _POSE_TIMEOUT_NS:
                         raise _Failed(_TF_ERROR)
                     if pose is None:
                         yield None
                         continue
-                    due = max(due, self.node.now_ns - self._period_ns) + self._period_ns
+                    beat.put_off(max(self._period_ns, beat.late_ns))
                     step = self._step(served, behavior, pose)
                     if step.done:
-                        elapsed = duration(self.node.now_ns - started)
+                        elapsed = duration(self.node.steady_ns - started)
                         return new(served.action.Result, total_elapsed_time=elapsed)
                     self._publisher.publish(twist_from_planar(step.v, step.w), frozen=True)
                     handle.publish_feedback(_feedback(served, behavior.progress))
-                    yield due
+                    yield beat.due_ns
             except _Failed as failure:
                 return _aborted(handle, name, served, failure)
             finally:

@@ -13,6 +13,7 @@ from twin.bridge.actions import ActionClient, ActionServer, ClientGoal, GoalHand
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import header, new
 from twin.bridge.node.tasks import Steps
+from twin.bridge.node.timers import Beat
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Interval
 
@@ -99,22 +100,23 @@ class WaypointFollowerNode:
         stamped = replace(pose, header=header(self.node.now_ns, frame))
         sent = self._navigate.send_goal(new(NavigateToPose.Goal, pose=stamped))
         try:
-            due = self.node.now_ns
+            beat = Beat(self.node.get_clock())
             while not sent.done:
                 if handle.is_cancel_requested:
                     return None
-                if self.node.now_ns >= due:
-                    due += round(1e9 / self.config.loop_rate)
+                if beat.late_ns >= 0:
+                    beat.put_off(round(1e9 / self.config.loop_rate))
                     handle.publish_feedback(new(FollowWaypoints.Feedback, current_waypoint=index))
-                yield due
+                yield beat.due_ns
         finally:
             if not sent.done:
                 sent.cancel()
         wait = self.config.wait_at_waypoint
         if sent.succeeded and wait.enabled:
-            end = self.node.now_ns + wait.waypoint_pause_duration * _MS
-            while self.node.now_ns < end:
+            pause = Beat(self.node.get_clock())
+            pause.put_off(wait.waypoint_pause_duration * _MS)
+            while pause.late_ns < 0:
                 if handle.is_cancel_requested:
                     return None
-                yield end
+                yield pause.due_ns
         return sent

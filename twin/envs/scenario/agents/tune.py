@@ -39,7 +39,7 @@ class Tune(Agent):
 
     def __init__(self, episode: Episode, config: Config) -> None:
         super().__init__(episode, config)
-        if not config.parameters:
+        if not config.parameters or not isinstance(config.parameters, Mapping):
             raise GymError("the agent tune has no parameters; valid is {'node:parameter': (low, high), ...}")
         self._knobs = [_Knob(episode, name, bounds) for name, bounds in config.parameters.items()]
         self.action_space = unit_box(len(self._knobs))

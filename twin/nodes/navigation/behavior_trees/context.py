@@ -37,6 +37,8 @@ class Odometer:
 
     def _on_odom(self, message: Odometry) -> None:
         now = ns(message.header.stamp)
+        if self._readings and now < self._readings[-1][0]:
+            self._readings.clear()  # the clock was set back
         self._readings.append((now, message.twist.twist.linear.x, message.twist.twist.linear.y))
         while len(self._readings) > 2 and self._readings[0][0] < now - self._window_ns:
             self._readings.popleft()
@@ -85,7 +87,7 @@ class NavigatorContext(TreeContext):
         goal_reached_tol: float,
         tree_nodes: Registry = MappingProxyType({}),
     ) -> None:
-        super().__init__(lambda: node.now_ns)
+        super().__init__(lambda: node.steady_ns)
         self.node = node
         self.robot_pose = robot_pose
         self.filter_duration_ns = filter_duration_ns

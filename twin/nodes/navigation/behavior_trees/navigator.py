@@ -11,6 +11,7 @@ from twin.bridge.actions import ActionServer, GoalHandle
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Path, duration, new
 from twin.bridge.node.tasks import Steps
+from twin.bridge.node.timers import Beat
 from twin.bridge.types import ActionType
 from twin.errors import NavigationError, nearest
 from twin.navigation.behavior_trees.blackboard import Blackboard
@@ -87,7 +88,8 @@ class Navigator:
         self._active: GoalHandle | None = None
         self._name = ""
         self._tree = self._load(setup.default_tree)
-        self._started = self._due = 0
+        self._started = 0
+        self._beat = Beat(context.node.get_clock())
         self._unplanned: Path | None = None
         self._progress = Progress(context.filter_duration_ns)
         self._server = ActionServer(
@@ -139,14 +141,14 @@ class Navigator:
                 if handle.is_cancel_requested:
                     handle.canceled()
                     return self._result(0, "canceled")
-                if self._context.now_ns() >= self._due:
-                    self._due += self.setup.tick_ns
+                if self._beat.late_ns >= 0:
+                    self._beat.put_off(self.setup.tick_ns)
                     status = self._tree.tick()
                     self.after_tick()
                     if status is not Status.RUNNING and not self._was_for_an_older_goal(status):
                         return self._end(handle, status)
                     self._publish_feedback(handle)
-                yield self._due
+                yield self._beat.due_ns
             handle.abort()
             return self._result(0, "preempted by another goal")
         except NavigationError as error:
@@ -184,7 +186,8 @@ class Navigator:
         board.set("path", self._unplanned or new(Path))
         board.set(*self.setup.entry(poses))
         board.set("number_recoveries", 0)
-        self._due = self._due if self._active is not None else now
+        if self._active is None:
+            self._beat = Beat(self._context.node.get_clock())
         self._tree, self._name, self._active, self._started = tree, name, handle, now
         self.goals += 1
         self._context.goal = pose2_from_pose(poses[-1].pose) if poses else None
@@ -231,7 +234,7 @@ class Navigator:
         distance, to_go_ns = self._progress.update(board.get("path"), pose, now)
         feedback = fill(
             self.setup.action.Feedback,
-            current_pose=pose_stamped(pose, self._context.robot_pose.frames.map, now),
+            current_pose=pose_stamped(pose, self._context.robot_pose.frames.map, self._context.node.now_ns),
             navigation_time=duration(now - self._started),
             estimated_time_remaining=duration(to_go_ns),
             number_of_recoveries=board.get("number_recoveries", 0),

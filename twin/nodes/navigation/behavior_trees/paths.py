@@ -126,5 +126,5 @@ class GetCurrentPose(NavigatorNode):
         pose = self.context.pose(frame, self.get("robot_base_frame"))
         if pose is None:
             return Status.FAILURE
-        self.put("current_pose", pose_stamped(pose, frame, self.context.now_ns()))
+        self.put("current_pose", pose_stamped(pose, frame, self.context.node.now_ns))
         return Status.SUCCESS

@@ -48,7 +48,7 @@ class Commander:
 
     def is_costmap_current(self, goal: FollowGoal) -> bool:
         """Return whether to drive on by the costmap; raises Abort if it has been out of date for long."""
-        now, fault = self._node.now_ns, self._costmap.fault
+        now, fault = self._node.steady_ns, self._costmap.fault
         if not fault:
             goal.current_ns, goal.waiting = now, False
         elif now - goal.current_ns > self._config.costmap_update_timeout_ns:
@@ -73,7 +73,8 @@ class Commander:
         Raises:
             Abort: the controller fails, or has found nothing for longer than is borne.
         """
-        costmap, dt, now = self._costmap.costmap, self._config.controller_period_ns * 1e-9, self._node.now_ns
+        costmap, now = self._costmap.costmap, self._node.steady_ns
+        dt = self._config.controller_period_ns * 1e-9
         if self.maneuver.active and costmap is not None:
             maneuvered = self.maneuver.command(in_odom, velocity, costmap, dt)
             if maneuvered is not None:
@@ -99,7 +100,7 @@ class Commander:
         tolerance = self._config.failure_tolerance_ns
         if tolerance <= 0 and tolerance != FOR_EVER_NS:
             raise Abort(failure.error_code, str(failure))
-        if 0 < tolerance < self._node.now_ns - goal.last_valid_ns:
+        if 0 < tolerance < self._node.steady_ns - goal.last_valid_ns:
             raise Abort(PATIENCE_EXCEEDED, f"no valid control for {tolerance * 1e-9:g} s: {failure}")
 
     def frees(self, goal: FollowGoal, in_map: Pose2, in_odom: Pose2, ahead: Array) -> bool:
@@ -108,7 +109,7 @@ class Commander:
         Now and then it finds a control that is valid, so it never stands blocked for long, and turns to and
         fro. It is tried once about one place; arguments as those of `command`.
         """
-        blocked = goal.blocked_ns is not None and self._node.now_ns - goal.blocked_ns < _AGAIN_NS
+        blocked = goal.blocked_ns is not None and self._node.steady_ns - goal.blocked_ns < _AGAIN_NS
         tried = goal.freed_at is not None and goal.freed_at.distance(in_map) < self._config.maneuver.reach
         if tried or self.maneuver.active or not blocked:
             return False
@@ -121,7 +122,7 @@ class Commander:
         """Begin one, if there is one on to the path ahead."""
         if self._costmap.costmap is None:
             return False
-        goal.searched_ns = self._node.now_ns
+        goal.searched_ns = self._node.steady_ns
         to_costmap = in_odom @ in_map.inverse()
         path = np.array([to_costmap @ Pose2(*pose) for pose in ahead.tolist()])
         if self.maneuver.begin(self._costmap.costmap, in_odom, path):

@@ -16,6 +16,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Odometry, SpeedLimit, Twist, new
 from twin.bridge.node.tasks import Steps
+from twin.bridge.node.timers import Beat
 from twin.geometry import Array, Pose2
 from twin.navigation.control.path_handler import PathHandler
 from twin.navigation.failures import ControlFailure
@@ -111,7 +112,7 @@ class ControllerServerNode:
         finished = stop = False
         try:
             goal = self._begin(handle.request)
-            due = self.node.now_ns
+            beat = Beat(self.node.get_clock())
             while True:
                 if handle.is_cancel_requested:
                     self._commander.maneuver.drop()
@@ -119,12 +120,12 @@ class ControllerServerNode:
                     handle.canceled()
                     finished = stop = True
                     return new(FollowPath.Result, error_msg="canceled")
-                if self.node.now_ns >= due:
-                    due += self.config.controller_period_ns
+                if beat.late_ns >= 0:
+                    beat.put_off(self.config.controller_period_ns)
                     if self._control(goal, handle):
                         finished, stop = True, self.config.publish_zero_velocity
                         return new(FollowPath.Result)
-                yield due
+                yield beat.due_ns
         except Abort as failure:
             finished = stop = True
             handle.abort()
@@ -144,7 +145,7 @@ class ControllerServerNode:
 
         A goal that preempts another is no new chance: that one's patience is used up, too.
         """
-        config, before, now = self.config, self._preempted, self.node.now_ns
+        config, before, now = self.config, self._preempted, self.node.steady_ns
         controller = chosen("controller", self.controllers, request.controller_id)
         checker = create(GOAL_CHECKERS, chosen("goal checker", config.goal_checkers, request.goal_checker_id))
         progress = chosen("progress checker", config.progress_checkers, request.progress_checker_id)
@@ -189,7 +190,7 @@ class ControllerServerNode:
         if not self._commander.is_costmap_current(goal):
             self._drive(0.0, 0.0)
             return False
-        if not goal.progress_checker.check(in_map, self.node.now_ns):
+        if not goal.progress_checker.check(in_map, self.node.steady_ns):
             if not self._commander.frees(goal, in_map, in_odom, ahead):
                 raise Abort(FAILED_TO_MAKE_PROGRESS, "failed to make progress")
             goal.progress_checker.reset()

@@ -73,7 +73,7 @@ class CostmapNode:
             self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._robot_pose = robot_pose
         self._layers = LayeredCostmap(config=config.layers) if config.layers.rolling_window else None
-        self._scans = {topic: _ScanSource(robot_pose, node.now_ns) for topic in config.scan_topics}
+        self._scans = {topic: _ScanSource(robot_pose, node.steady_ns) for topic in config.scan_topics}
         self._ranges: list[Range] = []
         self._polygon = config.layers.polygon
         own, voxels = f"{namespace}/{config.name}", config.layers.voxel_layer.publish_voxel_map
@@ -129,9 +129,11 @@ class CostmapNode:
     def fault(self) -> str:
         """Why the costmap is not current, so that nobody should drive by it; empty if it is."""
         tolerance_ns = round(self.config.layers.expected_update_rate * 1e9)
-        faults = [cloud.fault(self.node.now_ns) for cloud in self._clouds]
+        faults = [cloud.fault(self.node.steady_ns) for cloud in self._clouds]
         if tolerance_ns:
-            faults += [source.watch.fault(self.node.now_ns, tolerance_ns) for source in self._scans.values()]
+            faults += [
+                source.watch.fault(self.node.steady_ns, tolerance_ns) for source in self._scans.values()
+            ]
         return next(filter(None, faults), "") or self._contradiction
 
     @property
@@ -181,7 +183,7 @@ class CostmapNode:
         self._observe(layers, [cloud.latest(self.config.update_period_ns) for cloud in self._clouds])
 
     def _on_scan(self, source: _ScanSource, message: LaserScan) -> None:
-        if not source.watch.accept(message, self.node.now_ns):
+        if not source.watch.accept(message, self.node.steady_ns):
             return
         source.fresh = message
         if self.config.layers.rolling_window:

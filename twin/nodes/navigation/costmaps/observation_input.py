@@ -39,7 +39,7 @@ class ObservationInput:
         """
         self.source = source
         self._node, self._robot_pose, self._frame, self._topic = node, robot_pose, frame, topic
-        self._heard_ns = node.now_ns
+        self._heard_ns = node.steady_ns
         self._fresh: Any = None
         self._kept: deque[tuple[int, Observation]] = deque()
         self._told = ""
@@ -63,16 +63,16 @@ class ObservationInput:
             self._kept.append((ns(message.header.stamp), seen))
         elif not lasting_ns:
             return ()
-        while lasting_ns and self._kept and now_ns - self._kept[0][0] > lasting_ns:
+        while lasting_ns and self._kept and abs(now_ns - self._kept[0][0]) > lasting_ns:
             self._kept.popleft()
         return [seen for _, seen in self._kept]
 
     def latest(self, period_ns: int) -> Sequence[Observation]:
         """Return what was seen in the last period, and taken already."""
-        return [seen for stamp_ns, seen in self._kept if self._node.now_ns - stamp_ns <= period_ns]
+        return [seen for stamp_ns, seen in self._kept if abs(self._node.now_ns - stamp_ns) <= period_ns]
 
     def _on_message(self, message: Any) -> None:
-        self._heard_ns, self._fresh = self._node.now_ns, message
+        self._heard_ns, self._fresh = self._node.steady_ns, message
 
     def _seen(self, message: Any) -> Observation | None:
         T_frame_sensor = self._robot_pose.place_at_stamp(self._frame, message.header)

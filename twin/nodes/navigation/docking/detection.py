@@ -27,7 +27,7 @@ class DockDetection:
         self._type = DockType()
         self._expected = Pose2(0.0, 0.0, 0.0)
         self._estimate: DockEstimate | None = None
-        self._scans = ScanInput(robot_pose, node.now_ns)
+        self._scans = ScanInput(robot_pose, node.steady_ns)
         self._told: tuple[Pose2, int] | None = None
         """What `detected_dock_pose` says, in the odom frame, and the latest stamp of it [ns]."""
         node.create_subscription(
@@ -39,7 +39,7 @@ class DockDetection:
     def begin(self, docked: Pose2, type_: DockType) -> None:
         """Look for the dock at which the base would stand at `docked`, in the odom frame."""
         self._type, self._expected, self._told = type_, docked, None
-        self._estimate, self._scans = None, ScanInput(self._robot_pose, self._node.now_ns)
+        self._estimate, self._scans = None, ScanInput(self._robot_pose, self._node.steady_ns)
         if type_.detection != "none" and not type_.use_external_detection_pose:
             face = docked @ type_.T_detected_docked.inverse()
             self._estimate = DockEstimate(
@@ -91,7 +91,7 @@ class DockDetection:
         self._told = seen, stamp_ns
 
     def _on_scan(self, message: LaserScan) -> None:
-        if self._estimate is None or not self._scans.accept(message, self._node.now_ns):
+        if self._estimate is None or not self._scans.accept(message, self._node.steady_ns):
             return
         frames = self._robot_pose.frames
         T_base_lidar = self._robot_pose.at_stamp(frames.base, message.header)

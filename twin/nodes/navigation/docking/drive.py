@@ -10,6 +10,7 @@ import numpy as np
 from twin.bridge.conversions import twist_from_planar
 from twin.bridge.msgs import Twist
 from twin.bridge.node import Node
+from twin.bridge.node.timers import Beat
 from twin.geometry import Array, Pose2
 from twin.navigation.docking.config import DockCollisionConfig, LineApproachConfig
 from twin.navigation.docking.docks import DockError
@@ -73,14 +74,14 @@ class DockDrive:
             DockError: the pose was missed, took too long, or something stays in the way.
         """
         control = LineApproach(config, goal(), backward=backward)
-        due = free_ns = self._node.now_ns
+        beat, free_ns = Beat(self._node.get_clock()), self._node.steady_ns
         while True:
             attempt.check()
-            pose, now_ns = self._robot_pose.in_odom(), self._node.now_ns
-            if now_ns < due or pose is None:
-                yield due
+            pose, now_ns = self._robot_pose.in_odom(), self._node.steady_ns
+            if beat.late_ns < 0 or pose is None:
+                yield beat.due_ns
                 continue
-            due += self._period_ns
+            beat.put_off(self._period_ns)
             attempt.tell(state, now_ns)
             control.retarget(goal())
             obstruction = self._obstruction(control, pose, docked or goal())
@@ -93,7 +94,7 @@ class DockDrive:
             else:
                 control.halt()
                 self.stop()
-            yield due
+            yield beat.due_ns
 
     def _step(self, control: LineApproach, pose: Pose2) -> bool:
         """Command one period; return whether the robot is there."""

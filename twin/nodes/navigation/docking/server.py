@@ -89,7 +89,7 @@ class DockingServerNode:
         """Return what serves an action: it ends as its work ends, and the robot stands."""
 
         def serve(handle: GoalHandle) -> Work:
-            attempt = Attempt(handle, self.node.now_ns)
+            attempt = Attempt(handle, self.node.steady_ns)
             try:
                 yield from work(attempt)
                 return attempt.result()
@@ -134,13 +134,13 @@ class DockingServerNode:
         near = pose is not None and pose.distance(staging) < self.config.dock_prestaging_tolerance
         if near or not goal.navigate_to_staging_pose:
             return
-        deadline = self.node.now_ns + round(goal.max_staging_time * 1e9)
+        deadline = self.node.steady_ns + round(goal.max_staging_time * 1e9)
         target = pose_stamped(staging, dock.frame, self.node.now_ns)
         sent = self._navigator.send_goal(new(NavigateToPose.Goal, pose=target))
         try:
             while not sent.done:
-                attempt.tell(STAGING, self.node.now_ns)
-                if self.node.now_ns > deadline:
+                attempt.tell(STAGING, self.node.steady_ns)
+                if self.node.steady_ns > deadline:
                     raise DockError(
                         FAILED_TO_STAGE, f"not at the staging pose after {goal.max_staging_time:g} s"
                     )
@@ -191,15 +191,15 @@ class DockingServerNode:
         self.node.get_logger().warn(f"docking attempt {attempt.retries}: {error}; trying again")
 
     def _see(self, attempt: Attempt) -> Work:
-        deadline = self.node.now_ns + self.config.initial_perception_timeout_ns
+        deadline = self.node.steady_ns + self.config.initial_perception_timeout_ns
         while self._detection.docked() is None:
-            attempt.tell(PERCEPTION, self.node.now_ns)
-            if self.node.now_ns > deadline:
+            attempt.tell(PERCEPTION, self.node.steady_ns)
+            if self.node.steady_ns > deadline:
                 raise DockError(FAILED_TO_DETECT_DOCK, f"no {self._detection.lacks} in sight")
             yield None
 
     def _back_off(self, attempt: Attempt, goal: Callable[[], Pose2], docked: Pose2) -> Work:
-        attempt.tell(RETRY, self.node.now_ns)
+        attempt.tell(RETRY, self.node.steady_ns)
         config = self.config.undock
         try:
             yield from self._drive.drive(attempt, goal, config, state=RETRY, backward=True, docked=docked)
@@ -209,11 +209,11 @@ class DockingServerNode:
             self.node.get_logger().warn(f"backing off: {error}")
 
     def _wait_for_charge(self, attempt: Attempt, type_: DockType) -> Work:
-        deadline = self.node.now_ns + self.config.wait_charge_timeout_ns
+        deadline = self.node.steady_ns + self.config.wait_charge_timeout_ns
         while type_.is_charger and not self._is_charging(type_):
             self._drive.stop()
-            attempt.tell(WAITING, self.node.now_ns)
-            if self.node.now_ns > deadline:
+            attempt.tell(WAITING, self.node.steady_ns)
+            if self.node.steady_ns > deadline:
                 raise DockError(FAILED_TO_CHARGE, "docked, but the battery is not charged")
             yield None
 

@@ -207,7 +207,7 @@ class AmclNode:
         if not all(map(math.isfinite, odom)):
             self._report("odometry is not finite")
             return
-        self._scanned_ns = self.node.now_ns
+        self._scanned_ns = self.node.steady_ns
         ranges = message.ranges.astype(np.float64)
         ranges[ranges >= message.range_max] = np.inf
         ranges[ranges < message.range_min] = np.nan
@@ -215,7 +215,7 @@ class AmclNode:
         self._report(fault)
         angles = _angles(message.angle_min, message.angle_increment, len(ranges))
         self._localise(odom, np.zeros(0) if fault else ranges, angles, T_base_lidar, stamp_ns)
-        if stamp_ns >= self._particles_due:
+        if not 0 < self._particles_due - stamp_ns <= self.config.particles_period_ns:
             self._particles_due = stamp_ns + self.config.particles_period_ns
             self._publish_particles(stamp_ns)
 
@@ -260,7 +260,7 @@ class AmclNode:
 
     def _keep_transform(self) -> None:
         """Keep map → odom alive while no scan comes, or the robot would seem to stand still."""
-        stale = self._scanned_ns is None or self.node.now_ns - self._scanned_ns > _SCAN_OVERDUE_NS
+        stale = self._scanned_ns is None or self.node.steady_ns - self._scanned_ns > _SCAN_OVERDUE_NS
         if stale and self._filter is not None and self._filter.estimate is not None:
             self._broadcast(self._filter.estimate, self.node.now_ns)
 
@@ -269,7 +269,8 @@ class AmclNode:
         if self._filter is None:
             return
         now, frames = self.node.now_ns, self._robot_pose.frames
-        if self._scanned_ns is not None and now - self._scanned_ns > self.config.diagnostics_period_ns:
+        period_ns, scanned_ns = self.config.diagnostics_period_ns, self._scanned_ns
+        if scanned_ns is not None and self.node.steady_ns - scanned_ns > period_ns:
             self._report("no scan came")
             odom = self._robot_pose.relative(frames.odom, frames.base)
             if odom is not None and all(map(math.isfinite, odom)):

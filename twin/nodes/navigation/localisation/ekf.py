@@ -124,6 +124,8 @@ class EkfNode:
 
     def _update(self) -> None:
         now = self.node.now_ns
+        if self._time_ns is not None:
+            self._time_ns = min(self._time_ns, now)  # the clock may have been set back
         self._waiting.sort(key=lambda entry: entry[:2])
         for stamp_ns, _, reader, message in self._waiting:
             self._predict(min(stamp_ns, now))

@@ -18,6 +18,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.conversions import pose2_from_pose, pose_from_pose2
 from twin.bridge.msgs import MapMetaData, OccupancyGrid, header, new, stamp
 from twin.bridge.node.tasks import Steps
+from twin.bridge.node.timers import Beat
 from twin.bridge.qos import LATCHED, QoS
 from twin.bridge.services import Respond
 from twin.bridge.srvs import GetMap, LoadMap, SaveMap
@@ -164,9 +165,10 @@ class MapSaverNode:
         got: list[OccupancyGrid] = []
         qos = LATCHED if self.config.map_subscribe_transient_local else QoS(depth=1)
         subscription = self.node.create_subscription(OccupancyGrid, topic, got.append, qos)
-        end = self.node.now_ns + self.config.save_map_timeout_ns
-        while not got and self.node.now_ns < end:
-            yield end
+        wait = Beat(self.node.get_clock())
+        wait.put_off(self.config.save_map_timeout_ns)
+        while not got and wait.late_ns < 0:
+            yield wait.due_ns
         self.node.destroy_subscription(subscription)
         return got[0] if got else None
 

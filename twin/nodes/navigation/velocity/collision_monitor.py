@@ -106,12 +106,12 @@ class CollisionMonitorNode:
         return new(Toggle.Response, success=True, message=text)
 
     def _keep(self, topic: str) -> Callable[[Any], None]:
-        scans = ScanInput(self._robot_pose, self.node.now_ns)
+        scans = ScanInput(self._robot_pose, self.node.steady_ns)
 
         def on_message(message: Any) -> None:
             if isinstance(message, Range):
                 points = _arc(message)
-            elif scans.accept(message, self.node.now_ns):
+            elif scans.accept(message, self.node.steady_ns):
                 points = scan_points(message, np.nan)
             else:
                 return  # a lidar that broke or froze is as good as silent
@@ -147,10 +147,10 @@ class CollisionMonitorNode:
     def _braked(self, action: Action) -> tuple[float, float]:
         """Return what the drive can do of it on the same curve: each of its axes brakes by itself."""
         velocity = action.velocity
-        before, self._commanded_ns = self._commanded_ns, self.node.now_ns
+        before, self._commanded_ns = self._commanded_ns, self.node.steady_ns
         if self._brakes is None:
             return velocity
-        dt = 0.0 if before is None else (self.node.now_ns - before) * 1e-9
+        dt = 0.0 if before is None else (self.node.steady_ns - before) * 1e-9
         if before is None or dt > self._brakes.config.velocity_timeout:
             self._brakes.reset()
             dt = _FIRST_PERIOD_S
@@ -187,7 +187,7 @@ class CollisionMonitorNode:
 
     def _measured_from(self, reading: _Reading | None, timeout_ns: int) -> Pose2 | None:
         """Return where the sensor was, in `odom`; None if the reading is too old or no transform tells."""
-        if reading is None or (timeout_ns and self.node.now_ns - ns(reading.header.stamp) > timeout_ns):
+        if reading is None or (timeout_ns and abs(self.node.now_ns - ns(reading.header.stamp)) > timeout_ns):
             return None
         if reading.T_odom_sensor is None:
             reading.T_odom_sensor = self._robot_pose.at_stamp(self._robot_pose.frames.odom, reading.header)

@@ -37,7 +37,7 @@ class TwistMuxNode:
 
     def _callback(self, name: str, publisher: Publisher[Twist]) -> Callable[[Twist], None]:
         def on_twist(message: Twist) -> None:
-            if self.mux.accept(name, self.node.now_ns * 1e-9):
+            if self.mux.accept(name, self.node.steady_ns * 1e-9):
                 publisher.publish(message, frozen=True)
 
         return on_twist
