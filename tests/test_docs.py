@@ -70,6 +70,8 @@ NOT_RUN = {
     r"twin watch( --web .*| --topics .*)?": "opens a viewer: tests/cli/ros/test_watch.py saves instead",
     r"twin map info \.\./shared/.*": "needs ../shared/data: tests/cli/map has them",
     r"twin bench .*": "needs ../shared/data: tests/benchmarks has small ones",
+    r"twin foxglove.*": "serves until it is stopped: tests/web/foxglove does that",
+    r"twin teleop.*": "needs a terminal: tests/cli/live/test_teleop.py has one",
     r"twin bag (record|play) .*": "needs a graph beside it: tests/cli/ros/bag/test_bag_commands.py has one",
 }
 """Commands that are shown but not run here, and why."""

@@ -44,6 +44,7 @@ WALL_CLOCK = {
     "twin/runtime/workers/robots_here.py": {"process_time"},  # what a worker took
     "twin/live/plant.py": {"time_ns"},  # a physical robot's clock starts at the time of day
     "twin/live/guard/node.py": {"monotonic_ns"},  # time-outs of a robot's commands
+    "twin/live/teleop/node.py": {"monotonic_ns"},  # the dead man's time-out
     "twin/live/guard/client.py": {"monotonic_ns"},  # stamps that no setting of the clock moves
     "twin/live/futures/future.py": {"process_time"},  # what a future cost
     "twin/live/futures/futures.py": {"monotonic"},  # the time limit of a future

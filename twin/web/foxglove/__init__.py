@@ -1,0 +1,1 @@
+"""A websocket for Foxglove, by its own SDK."""
