@@ -68,6 +68,7 @@ TABLE = {
     "router": Command(_GRAPH, "Run a Zenoh router, as rmw_zenohd, until Ctrl-C.", "ros.router", "router", "twin router --listen tcp/127.0.0.1:7447"),
     "exec": Command(_GRAPH, "Run nodes beside a simulation until it ends, or Ctrl-C.", "exec", "execute", "twin exec my_controller.py:make_node --lockstep", needs_arguments=True),
     "guard": Command(_GRAPH, "Guard a robot: limits, watchdog, emergency stop.", "live.guard", example="twin guard --robot my_robot.urdf --max-speed 0.5"),
+    "rosbridge": Command(_GRAPH, "Let web clients take part in a graph: rosbridge v2, and the operator's page, on one port.", "ros.rosbridge", "rosbridge", "twin rosbridge --port 9090"),
     "watch": Command(_GRAPH, "Show a run or any ROS 2 graph in the Rerun viewer, live: RViz's job.", "ros.watch", "watch", "twin watch --topics /scan --topics '/camera/*'"),
     "topic": Command(_GRAPH, "Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.", "ros.topic"),
     "node": Command(_GRAPH, "Nodes: list, look, draw; as `ros2 node` and rqt_graph.", "ros.node"),

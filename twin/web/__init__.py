@@ -1,0 +1,1 @@
+"""Ways from a browser, and from web clients, into a ROS graph."""
