@@ -50,6 +50,8 @@ class DiffDriveController:
         self._angular = SpeedLimiter(config.angular)
         self._command = (0.0, 0.0)
         self._age = math.inf
+        self._stopping: float | None = None
+        """Deceleration of an emergency stop [m/s²]; None: it may move."""
 
     def set_command(self, linear: float, angular: float) -> bool:
         """Take a command [m/s, rad/s]; return False, and keep the old one, if it is not finite."""
@@ -58,6 +60,14 @@ class DiffDriveController:
         self._command = (linear, angular)
         self._age = 0.0
         return True
+
+    def stop(self, deceleration: float) -> None:
+        """Brake to standstill along the present curve, past all limits [m/s²], and stand until `release`."""
+        self._stopping = deceleration
+
+    def release(self) -> None:
+        """Go by commands that come from now on."""
+        self._stopping, self._age = None, math.inf
 
     @property
     def track(self) -> float:
@@ -68,10 +78,16 @@ class DiffDriveController:
         """Advance by `dt` [s] and return the wheel set-points within all limits."""
         timed_out = self._age > self.config.cmd_vel_timeout
         self._age += dt
-        linear, angular = (0.0, 0.0) if timed_out else self._command
-        v = self._linear.limit(linear, dt)
-        w = self._angular.limit(angular, dt)
         radius, half = self.config.wheel_radius, self.track / 2.0
+        if self._stopping is None:
+            linear, angular = (0.0, 0.0) if timed_out else self._command
+            v = self._linear.limit(linear, dt)
+            w = self._angular.limit(angular, dt)
+        else:
+            fastest = max(abs(self._linear.value), abs(self._angular.value) * half)
+            left_over = max(0.0, 1.0 - self._stopping * dt / fastest) if fastest else 0.0
+            v = self._linear.value = self._linear.value * left_over
+            w = self._angular.value = self._angular.value * left_over
         left, right = (v - w * half) / radius, (v + w * half) / radius
         fastest = max(abs(left), abs(right))
         if fastest > self.config.max_wheel_velocity:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from twin.models.catalogue import catalogue
-from twin.parameters import NotNegative, Seconds
+from twin.parameters import MetresPerSecondSquared, NotNegative, Positive, Seconds
 from twin.scenario.detectors import DetectorEntry
 from twin.scenario.fields import ArgumentText, NameOrPath, PoseConfig, RosName, faultless, known
 from twin.scenario.localisation import Localisation, Odometry, WheelOdometry
@@ -40,6 +40,8 @@ class RobotConfig(StrictModel):
     """`free`: moved by physics; `fixed`: bolted to the world; `kinematic`: moved by a publisher of poses."""
     command_latency: Annotated[Seconds, NotNegative] = 0.0
     """Between a command to its motors and their start [s]; a whole number of control periods."""
+    emergency_deceleration: Annotated[MetresPerSecondSquared, Positive] = 3.0
+    """Of its base, when its [emergency stop](guard.md#in-a-run) is pressed."""
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
     lidar_odometry: LidarOdometryParameters | None = None

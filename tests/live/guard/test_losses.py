@@ -9,8 +9,8 @@ import pytest
 
 from twin.live.guard.gate import STILL, Gate, GateConfig, Lane
 from twin.live.guard.request import Request
-from twin.live.guard.status import Acknowledgement
-from twin.live.guard.verdict import Verdict
+from twin.nodes.guard.status import Acknowledgement
+from twin.nodes.guard.verdict import Verdict
 
 MS = 1_000_000
 STOP_MS, RELEASE_MS, END_MS = 100, 400, 800
@@ -49,7 +49,8 @@ class Story:
                     gate.stop(request.by, now_ns)
                     verdict = Verdict.ACCEPTED
                 else:
-                    verdict = gate.release(request.stamp_ns, now_ns)
+                    released = gate.release(request.stamp_ns, now_ns)
+                    verdict = Verdict.ACCEPTED if released else Verdict.OLD
                 if self.arrives():
                     said = Acknowledgement(
                         kind=request.kind,

@@ -30,8 +30,8 @@ from twin.controllers.limiter import AxisLimits
 from twin.live.guard.client import Exchange, GuardClient
 from twin.live.guard.gate import GateConfig, Lane, Velocity
 from twin.live.guard.node import GuardNode, GuardTopics
-from twin.live.guard.status import GuardStatus
-from twin.live.guard.verdict import Verdict
+from twin.nodes.guard.status import GuardStatus
+from twin.nodes.guard.verdict import Verdict
 
 START_NS = 1_700_000_000_000_000_000
 MS = 1_000_000

@@ -11,9 +11,9 @@ from twin.bridge.msgs import DiagnosticArray, Header, TwistStamped, header, new
 from twin.bridge.node import Node
 from twin.bridge.qos import LATCHED, QoS
 from twin.live.guard.gate import Lane, Velocity
-from twin.live.guard.node import STATUS_PERIOD_NS
 from twin.live.guard.request import AGAIN_NS, Request
-from twin.live.guard.status import Acknowledgement, GuardStatus
+from twin.nodes.guard.status import Acknowledgement, GuardStatus
+from twin.nodes.guard.stop_topics import STATUS_PERIOD_NS
 
 _GONE_NS = 7 * STATUS_PERIOD_NS // 2
 """After three statuses that did not come."""

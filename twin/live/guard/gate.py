@@ -6,16 +6,17 @@ Every `now_ns` is by a clock that is never set, such as the time since the compu
 from __future__ import annotations
 
 import math
-from collections import Counter, OrderedDict, deque
+from collections import Counter, OrderedDict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from twin.controllers.emergency_stop import RELEASE_WITHIN_S, EmergencyStop
 from twin.controllers.limiter import AxisLimits, SpeedLimiter
 from twin.controllers.twist_mux import MuxInput, TwistMux
 from twin.live.guard.stamps import SenderStamps
-from twin.live.guard.verdict import Verdict
+from twin.nodes.guard.verdict import Verdict
 
 _MOST_SENDERS = 1000
 _LONGEST_STEP_S = 0.1
@@ -43,7 +44,7 @@ class GateConfig:
     """So long [s] after an operator's last command autonomy's are refused."""
     max_age: float = 0.25
     """A command may be under way for so much longer [s] than the quickest of its sender."""
-    release_within: float = 2.0
+    release_within: float = RELEASE_WITHIN_S
     """A release may come so long [s] after the status that its sender saw."""
 
     @property
@@ -67,20 +68,15 @@ class Velocity(NamedTuple):
 STILL = Velocity()
 
 
-class Gate:
+class Gate(EmergencyStop):
     """Stopped from the start: who begins anew does not know whether it was stopped before."""
 
     def __init__(self, config: GateConfig) -> None:
         """Wait for a release."""
+        super().__init__("start", config.release_within)
         self.config = config
         self.verdicts: Counter[Verdict] = Counter()
         """How many commands, by what became of them."""
-        self.stopped_by: str | None = "start"
-        """Who holds the robot stopped; None: it may move."""
-        self.stops = 0
-        """How often it was stopped while it could move."""
-        self._stopped_ns = 0
-        self._told: deque[tuple[int, int]] = deque()
         self._senders: OrderedDict[tuple[Lane, Hashable], SenderStamps] = OrderedDict()
         self._limited_ns: int | None = None
         self._halt()
@@ -107,36 +103,9 @@ class Gate:
         return verdict
 
     def stop(self, by: str, now_ns: int) -> None:
-        """Stop the robot at once, until a release; what is heard again is as good as new."""
-        if self.stopped_by is None:
-            self.stops += 1
-        self.stopped_by = by or "somebody"
-        self._stopped_ns = now_ns
+        """Stop the robot at once, until a release."""
+        super().stop(by, now_ns)
         self._halt()
-
-    def told(self, stamp_ns: int, now_ns: int) -> None:
-        """Note that a status with this stamp tells what is the case now."""
-        self._told.append((stamp_ns, now_ns))
-        while now_ns - self._told[0][1] > self.config.release_within * 1e9:
-            self._told.popleft()
-
-    def release(self, seen_ns: int | None, now_ns: int) -> Verdict:
-        """Let the robot move again, by commands that come from now on.
-
-        Args:
-            seen_ns: Stamp of the status by which the one who releases knows of the stop: a release that was
-                under way for too long, or before another stop, releases nothing. None: whatever it knows.
-            now_ns: When it arrived.
-        """
-        if self.stopped_by is None:
-            return Verdict.ACCEPTED
-        least_ns = max(self._stopped_ns, now_ns - round(self.config.release_within * 1e9))
-        if seen_ns is not None and not any(
-            stamp_ns == seen_ns and told_ns >= least_ns for stamp_ns, told_ns in self._told
-        ):
-            return Verdict.OLD
-        self.stopped_by = None
-        return Verdict.ACCEPTED
 
     def in_charge(self, now_ns: int) -> Lane | None:
         """Return whose commands count now; None: nobody's, as nobody has commanded lately."""

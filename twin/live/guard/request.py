@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from twin.live.guard.status import Acknowledgement
-from twin.live.guard.verdict import Verdict
+from twin.nodes.guard.status import Acknowledgement
+from twin.nodes.guard.verdict import Verdict
 
 AGAIN_NS = 50_000_000
 """Until it is said again."""

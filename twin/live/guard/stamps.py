@@ -7,7 +7,7 @@ with, as in NTP's clock filter (RFC 5905, section 10); clocks that drift apart a
 
 from __future__ import annotations
 
-from twin.live.guard.verdict import Verdict
+from twin.nodes.guard.verdict import Verdict
 
 _LARGEST_DRIFT = 500e-6
 """No two computers' clocks drift apart faster, as a share of time."""

@@ -15,7 +15,6 @@ from twin.bridge.topics import Publisher
 from twin.geometry import Pose2
 from twin.live.guard.client import GuardClient
 from twin.live.guard.gate import Velocity
-from twin.live.guard.verdict import Verdict
 from twin.live.mirror.claim import Claim
 from twin.live.mirror.divergence import DivergenceNode
 from twin.live.mirror.follower import Difference, Follower, FollowerConfig
@@ -26,6 +25,7 @@ from twin.live.mirror.relocalising import Relocalising
 from twin.live.mirror.source import ClockChange, Source
 from twin.live.mirror.status import Status
 from twin.live.mirror.told import Told
+from twin.nodes.guard.verdict import Verdict
 from twin.nodes.messages import pose_stamped
 from twin.runtime.stacks.robot import RobotStack
 from twin.sim.world import World

@@ -11,6 +11,7 @@ from twin.geometry import Pose2, Pose3
 from twin.models.description import RobotDescription
 from twin.navigation.recovery import BehaviorConfig
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
+from twin.nodes.guard.drive_stop import DriveStopNode
 from twin.nodes.joint_state_broadcaster import JointStateBroadcasterNode
 from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.robot_state_publisher import RobotStatePublisherNode
@@ -111,6 +112,13 @@ class RobotStack:
             ),
             namespace=context.hardware_namespace,
         )
+        if context.layout.autonomy == "all" and not context.layout.hardware:
+            DriveStopNode(
+                context.bus,
+                node.controller,
+                deceleration=context.config.emergency_deceleration,
+                namespace=context.namespace,
+            )
         if drive.guessed:
             node.node.get_logger().warn(
                 f"'{self.name}' has no drive plugin; by its wheels it is {drive.words}"

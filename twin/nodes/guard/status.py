@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from twin.bridge.msgs import DiagnosticArray, DiagnosticStatus, KeyValue, header, ns
-from twin.live.guard.verdict import Verdict
+from twin.nodes.guard.verdict import Verdict
 
 _OK, _WARN, _ERROR = 0, 1, 2
 _VERDICTS = frozenset(Verdict)

@@ -1,0 +1,1 @@
+"""Who may move a robot: its emergency stop, and what is said of it."""
