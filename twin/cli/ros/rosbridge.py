@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -53,6 +54,7 @@ def rosbridge(
         float, typer.Option(metavar="HZ", min=1.0, help="Of messages from a client.")
     ] = 100.0,
     max_clients: Annotated[int, typer.Option(min=1, help="At a time.")] = 50,
+    parent: Annotated[int, typer.Option(hidden=True, help="End when this process does.")] = 0,
     *,
     joining: Joining,
 ) -> None:
@@ -85,6 +87,6 @@ def rosbridge(
         bridge = Rosbridge(process, config, bridging)
         try:
             typer.echo(f"rosbridge listens on {bridge.server.address}; Ctrl-C ends it")
-            bridge.spin(lambda: bool(received))
+            bridge.spin(lambda: bool(received) or (parent > 0 and os.getppid() != parent))
         finally:
             bridge.close()

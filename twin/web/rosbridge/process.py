@@ -65,7 +65,9 @@ def audit_file(file: Path) -> Callable[[str], None]:
     """
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        handler = RotatingFileHandler(file, maxBytes=_AUDIT_BYTES, backupCount=1, encoding="utf-8")
+        handler = RotatingFileHandler(
+            file, maxBytes=_AUDIT_BYTES, backupCount=1, encoding="utf-8", delay=True
+        )
     except OSError as error:
         raise BridgeError(f"{file}: the audit cannot be written: {error}") from None
     return lambda line: handler.emit(logging.makeLogRecord({"msg": line}))
