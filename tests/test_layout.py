@@ -69,6 +69,11 @@ WALL_CLOCK = {
     "benchmarks/twin_benchmarks/slam/trial.py": {"perf_counter"},  # times faster than the robot drove
     "twin/experiments/pytest_plugin.py": {"now"},  # the name of a folder of runs
     "twin/experiments/report/page.py": {"now"},  # when the page was written
+    "twin/web/rosbridge/bridge.py": {
+        "monotonic",
+        "time_ns",
+    },  # time-outs of clients; when a command was given
+    "twin/web/rosbridge/server.py": {"monotonic"},  # rates and time limits of clients
     "twin/cli/ros/watch.py": {"monotonic"},  # how long is watched
     "twin/cli/run/folders.py": {"now"},  # the name of a run's folder
 }

@@ -70,6 +70,7 @@ TABLE = {
     "guard": Command(_GRAPH, "Guard a robot: limits, watchdog, emergency stop.", "live.guard", example="twin guard --robot my_robot.urdf --max-speed 0.5"),
     "teleop": Command(_GRAPH, "Drive a robot with keys or a gamepad.", "live.teleop", "teleop", "twin teleop --layout turtlebot3"),
     "foxglove": Command(_GRAPH, "Serve a graph to Foxglove, on this computer.", "ros.foxglove", "foxglove", "twin foxglove --control"),
+    "rosbridge": Command(_GRAPH, "Let web clients take part in a graph: rosbridge v2, and the operator's page, on one port.", "ros.rosbridge", "rosbridge", "twin rosbridge --port 9090"),
     "watch": Command(_GRAPH, "Show a run or any ROS 2 graph in the Rerun viewer, live: RViz's job.", "ros.watch", "watch", "twin watch --topics /scan --topics '/camera/*'"),
     "topic": Command(_GRAPH, "Topics: list, look, measure, publish, pass on; as `ros2 topic` and topic_tools.", "ros.topic"),
     "node": Command(_GRAPH, "Nodes: list, look, draw; as `ros2 node` and rqt_graph.", "ros.node"),

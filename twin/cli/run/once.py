@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,13 +48,13 @@ def run_once(options: RunOptions) -> int:
         nodes=options.node or (),
         wait_for=options.wait_for or (),
         wait_timeout=options.wait_timeout,
-        free=options.free,
+        free=options.free or options.web,
         keep_inputs=options.keep_inputs,
         on_execute=lambda file: stderr().print(f"executes {file}"),
     )
     fault = None
     try:
-        with run_progress(options.scenario.stem) as progress:
+        with _web(options), run_progress(options.scenario.stem) as progress:
             simulation.run(progress)
     except TwinError as error:
         fault = error
@@ -89,6 +89,15 @@ def run_once(options: RunOptions) -> int:
             console.print(difference_report(difference))
     simulation.wait_for_viewer()
     return max(verdict.exit_code, int(difference is not None and not difference.same))
+
+
+def _web(options: RunOptions) -> AbstractContextManager[None]:
+    """Return the bridge beside the run, if there is to be one."""
+    if not options.web:
+        return nullcontext()
+    from twin.cli.run.web import rosbridge_beside
+
+    return rosbridge_beside(options.joining, options.web_port, options.out or Path("runs"))
 
 
 def _golden(path: Path) -> Side:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,7 +49,7 @@ class RunOptions:
         str | None,
         typer.Option(
             help="Simulated seconds per second: a number, or max.",
-            show_default="max; 1 with --free or --view",
+            show_default="max; 1 with --free, --view or --web",
         ),
     ] = None
     view: Annotated[
@@ -58,6 +58,11 @@ class RunOptions:
             "--view", help="Show the run while it goes on: in a window, or on a page for a browser."
         ),
     ] = False
+    web: Annotated[
+        bool,
+        _others("--web", help="Serve web clients and the operator's page: `twin rosbridge` beside the run."),
+    ] = False
+    web_port: Annotated[int, _others(min=0, max=65535, help="Where they connect.")] = 9090
     listen: Annotated[
         list[str] | None,
         _others(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
@@ -116,6 +121,10 @@ class RunOptions:
             raise typer.BadParameter("--golden compares one run; leave --repeat and --expect-one-hash out")
         if self.view and (self.repeat > 1 or self.expect_one_hash):
             raise typer.BadParameter("--view shows one run; leave --repeat and --expect-one-hash out")
+        if self.web and (self.repeat > 1 or self.expect_one_hash or self.wait_for):
+            raise typer.BadParameter(
+                "--web is of one run at its own pace: no --repeat, --wait-for and the like"
+            )
         _ = self.overrides, self.speed  # raise ScenarioError
 
     @property
@@ -130,7 +139,8 @@ class RunOptions:
         Who does not say it wants `max`, or real time if people watch or others live by their own clocks.
         """
         if self.pace is None or self.pace == "max":
-            return 1.0 if (self.free or self.view) and self.pace is None else None
+            watched = self.free or self.view or self.web
+            return 1.0 if watched and self.pace is None else None
         try:
             speed = float(self.pace)
         except ValueError:
@@ -144,18 +154,39 @@ class RunOptions:
     @property
     def network(self) -> SessionConfig | None:
         """How the bus takes part in a network, None if it does not."""
-        if not (self.listen or self.connect or self.zenoh_config):
+        listen = tuple(self.listen or ())
+        if self.web and not self.joined:
+            listen = (self.endpoint,)
+        if not (listen or self.joined):
             return None
         from twin.bridge.wire.session import SessionConfig
 
         return SessionConfig(
-            mode="client" if self.connect and not self.listen else "peer",
-            listen=tuple(self.listen or ()),
+            mode="client" if self.connect and not listen else "peer",
+            listen=listen,
             connect=tuple(self.connect or ()),
             file=self.zenoh_config,
             wire=self.wire,
             domain_id=self.domain,
         )
+
+    @property
+    def joined(self) -> bool:
+        """Whether the options themselves say how others meet the run."""
+        return bool(self.listen or self.connect or self.zenoh_config)
+
+    @cached_property
+    def endpoint(self) -> str:
+        """Where the bridge meets the run: where it listens, or a port that is free now."""
+        from twin.cli.run.web import free_endpoint
+
+        return next(iter(self.listen or self.connect or ()), "") or free_endpoint()
+
+    @property
+    def joining(self) -> list[str]:
+        """The options by which another command joins the run."""
+        where = ["--config", str(self.zenoh_config)] if self.zenoh_config else ["--connect", self.endpoint]
+        return [*where, "--domain", str(self.domain), "--wire", self.wire]
 
     def arguments(self, out: Path) -> list[str]:
         """Return the arguments of a `twin` that does the same once, in a folder, and prints JSON."""

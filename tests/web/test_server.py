@@ -1,0 +1,315 @@
+"""The server on real sockets: who is let in, and what becomes of those who misbehave."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from tests.processes import wait_for
+from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
+from twin.bridge.live import LiveBus
+from twin.bridge.msgs import String, Twist
+from twin.bridge.srvs import Trigger
+from twin.errors import BridgeError
+from twin.web.rosbridge.access import read_tokens
+from twin.web.rosbridge.bridge import BridgeConfig, Limits
+from twin.web.rosbridge.outbox import Outbox
+from twin.web.rosbridge.process import Rosbridge
+from twin.web.rosbridge.server import ServerConfig
+
+SECRETS = "viewer-0123456789", "operator-0123456789"
+
+
+@contextmanager
+def serving(
+    config: ServerConfig, limits: Limits | None = None, nodes: Callable[[Bus], Any] = lambda bus: None
+) -> Iterator[Rosbridge]:
+    """A bridge on a bus of its own, run by a thread."""
+    made: list[Rosbridge] = []
+    ready, over = threading.Event(), threading.Event()
+
+    def run() -> None:
+        clock = Clock()
+        with Bus.open(clock) as bus:
+            process = LiveBus(bus, clock, use_sim_time=False)
+            rosbridge = Rosbridge(process, config, BridgeConfig(limits or Limits()))
+            nodes(bus)
+            made.append(rosbridge)
+            ready.set()
+            try:
+                rosbridge.spin(over.is_set)
+            finally:
+                rosbridge.close()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        assert ready.wait(60.0)
+        yield made[0]
+    finally:
+        over.set()
+        thread.join(60.0)
+
+
+def ask(client: ClientConnection, **message: Any) -> dict[str, Any]:
+    client.send(json.dumps(message))
+    return json.loads(client.recv(timeout=60.0))
+
+
+def topics(client: ClientConnection) -> dict[str, Any]:
+    return ask(client, op="call_service", service="/rosapi/topics")
+
+
+@pytest.fixture
+def tokens(tmp_path: Path) -> ServerConfig:
+    file = tmp_path / "tokens"
+    file.write_text(f"# secrets\n{SECRETS[0]} viewer\n{SECRETS[1]} operator Mei  # at the desk\n")
+    return ServerConfig(port=0, tokens=read_tokens(file))
+
+
+@pytest.mark.parametrize("how", ["header", "query", "message"])
+def test_a_token_lets_in(tokens: ServerConfig, how: str) -> None:
+    with serving(tokens) as server:
+        query = f"/?token={SECRETS[0]}" if how == "query" else ""
+        headers = {"Authorization": f"Bearer {SECRETS[0]}"} if how == "header" else {}
+        with connect(server.server.address + query, additional_headers=headers) as client:
+            if how == "message":
+                client.send(json.dumps({"op": "auth", "token": SECRETS[0]}))
+            assert topics(client)["result"]
+            told = ask(client, op="advertise", topic="/cmd_vel", type="geometry_msgs/Twist")
+            assert "the role viewer" in told["msg"]
+
+
+def test_ten_wrong_tokens_lock_an_address_out(tokens: ServerConfig) -> None:
+    with serving(tokens) as server:
+        address = server.server.address
+        with connect(address) as client:
+            client.send(json.dumps({"op": "call_service", "service": "/rosapi/topics"}))
+            with pytest.raises(ConnectionClosed, match="1008"):
+                client.recv(timeout=60.0)
+        with connect(f"{address}/?token={SECRETS[1]}") as client:
+            assert topics(client)["result"]
+        for _ in range(10):
+            with pytest.raises(InvalidStatus, match="401"):
+                connect(f"{address}/?token=wrong")
+        with pytest.raises(InvalidStatus, match="401"):
+            connect(f"{address}/?token={SECRETS[1]}")
+
+
+def test_more_than_this_computer_needs_a_token() -> None:
+    with pytest.raises(BridgeError, match="--token"):
+        ServerConfig(address="0.0.0.0")
+
+
+@pytest.mark.parametrize("line", ["short viewer", f"{SECRETS[0]} king", SECRETS[0], "# nothing"])
+def test_a_file_of_no_tokens_is_refused_and_not_told(tmp_path: Path, line: str) -> None:
+    file = tmp_path / "tokens"
+    file.write_text(line)
+    with pytest.raises(BridgeError) as fault:
+        read_tokens(file)
+    assert SECRETS[0] not in str(fault.value)
+
+
+@pytest.mark.parametrize(
+    ("origin", "is_welcome"),
+    [
+        ("http://localhost:8000", True),
+        ("http://hall.example", True),
+        ("http://evil.example", False),
+        ("null", False),
+        ("http://127.0.0.1.evil.example", False),
+    ],
+)
+def test_pages_of_other_servers_are_kept_out(origin: str, is_welcome: bool) -> None:
+    with serving(ServerConfig(port=0, origins=("http://hall.example",))) as server:
+        if is_welcome:
+            with connect(server.server.address, origin=origin) as client:  # type: ignore[arg-type]
+                assert topics(client)["result"]
+        else:
+            with pytest.raises(InvalidStatus, match="403"):
+                connect(server.server.address, origin=origin)  # type: ignore[arg-type]
+
+
+def test_a_name_of_somebody_else_is_refused() -> None:
+    with serving(ServerConfig(port=0)) as server:
+        address = server.server.address.replace("ws://", "http://")
+        request = urllib.request.Request(address, headers={"Host": "rebound.example"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(request, timeout=60.0)
+
+
+def test_files_for_browsers(tmp_path: Path) -> None:
+    (tmp_path / "page").mkdir()
+    page = b'<script type="importmap">{"imports":{}}</script>'
+    (tmp_path / "page" / "index.html").write_bytes(page)
+    (tmp_path / "page" / "app.mjs").write_text("export {}")
+    (tmp_path / "page" / ".hidden").write_text("secret")
+    (tmp_path / "secret").write_text("secret")
+    (tmp_path / "page" / "link").symlink_to(tmp_path / "secret")
+    with serving(ServerConfig(port=0, folders={"": tmp_path / "page"})) as server:
+        address = server.server.address.replace("ws://", "http://")
+        with urllib.request.urlopen(f"{address}/?x=1", timeout=60.0) as answer:
+            assert answer.read() == page
+            policy = answer.headers["Content-Security-Policy"]
+        assert "default-src 'self'" in policy
+        assert "'sha256-" in policy
+        with urllib.request.urlopen(f"{address}/app.mjs", timeout=60.0) as answer:
+            assert answer.headers["Content-Type"].startswith("text/javascript")
+        for path in ("/none", "/../secret", "/%2e%2e/secret", "/.hidden", "/link", "//etc/passwd", "/a%00b"):
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                urllib.request.urlopen(address + path, timeout=60.0)
+
+
+def test_too_large_too_often_too_many() -> None:
+    limits = Limits(message_bytes=10_000, messages_per_s=20.0, clients=2)
+    with serving(ServerConfig(port=0), limits) as server:
+        address = server.server.address
+        with connect(address) as client, connect(address) as other:
+            with pytest.raises(InvalidStatus, match="503"):
+                connect(address)
+            other.send("x" * 20_000)
+            with pytest.raises(ConnectionClosed, match="1009"):
+                other.recv(timeout=60.0)
+            for _ in range(200):
+                client.send(json.dumps({"op": "set_level", "level": "info"}))
+            assert "more than 20 messages a second" in json.loads(client.recv(timeout=60.0))["msg"]
+        wait_for(lambda: not server.server.connections)
+        with connect(address) as client:
+            client.send("no json")
+            assert "no JSON" in json.loads(client.recv(timeout=60.0))["msg"]
+            assert topics(client)["result"]
+
+
+def test_a_stop_overtakes_what_waits_and_is_never_too_much() -> None:
+    order: list[str] = []
+
+    def nodes(bus: Bus) -> None:
+        node = bus.create_node("robot")
+        node.create_subscription(String, "/chatter", lambda message: order.append(message.data), 1000)
+        node.create_service(
+            Trigger, "/guard/stop", lambda r: order.append("stop") or Trigger.Response(True, "")
+        )
+        # A bridge that is busy: all that is sent meanwhile waits.
+        node.create_subscription(String, "/busy", lambda message: time.sleep(0.5), 10)
+
+    limits = Limits(messages_per_s=60.0)
+    with serving(ServerConfig(port=0), limits, nodes) as server, connect(server.server.address) as client:
+        for topic in ("/chatter", "/busy"):
+            client.send(json.dumps({"op": "advertise", "topic": topic, "type": "std_msgs/String"}))
+        client.send(json.dumps({"op": "publish", "topic": "/busy", "msg": {}}))
+        time.sleep(0.2)
+        for number in range(150):  # more than the rate: what is too much is dropped, the stop is not
+            client.send(json.dumps({"op": "publish", "topic": "/chatter", "msg": {"data": str(number)}}))
+        client.send(json.dumps({"op": "call_service", "service": "/guard/stop", "id": "stop"}))
+        while json.loads(client.recv(timeout=60.0)).get("id") != "stop":
+            pass
+        wait_for(lambda: "stop" in order and len(order) > 50)
+    before = order.index("stop")
+    assert before < 20, f"{before} messages were handled before the stop"
+
+
+def test_who_is_gone_while_it_steers_is_stopped() -> None:
+    heard: list[float] = []
+
+    def nodes(bus: Bus) -> None:
+        robot = bus.create_node("robot")
+        robot.create_subscription(Twist, "/cmd_vel", lambda message: heard.append(message.linear.x), 10)
+
+    with serving(ServerConfig(port=0), nodes=nodes) as server, connect(server.server.address) as client:
+        client.send(json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 0.3}}}))
+        wait_for(lambda: heard == [0.3])
+        client.socket.shutdown(socket.SHUT_RDWR)  # a browser that is killed says no goodbye
+        wait_for(lambda: heard == [0.3, 0.0])
+
+
+def test_who_reads_nothing_is_given_up_and_others_hear() -> None:
+    limits = Limits(stalled_s=0.5, waiting_bytes=1_000_000)
+    talking = threading.Event()
+
+    def nodes(bus: Bus) -> None:
+        node = bus.create_node("talker")
+        publisher = node.create_publisher(String, "/big")
+        node.create_timer(
+            10_000_000, lambda: None if talking.is_set() else publisher.publish(String("x" * 200_000))
+        )
+
+    with serving(ServerConfig(port=0), limits, nodes) as server:
+        address = server.server.address
+        with connect(address, max_size=None) as reader:
+            lazy = socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2])))
+            lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            lazy.sendall(f"GET / HTTP/1.1\r\nHost: localhost\r\n{upgrade}{key}\r\n".encode())
+            text = json.dumps({"op": "subscribe", "topic": "/big"}).encode()
+            lazy.sendall(bytes([0x81, 0x80 | len(text)]) + bytes(4) + text)
+            wait_for(lambda: len(server.server.connections) == 2)
+            reader.send(text.decode())
+            waiting = []
+
+            def is_gone() -> bool:
+                reader.recv(timeout=60.0)
+                waiting.extend(c.outbox._bytes for c in tuple(server.server.connections))
+                return len(server.server.connections) == 1
+
+            wait_for(is_gone)
+            assert max(waiting) <= 1_300_000
+            talking.set()
+            lazy.close()
+
+
+def test_newer_messages_win() -> None:
+    outbox = Outbox(1000)
+    for number in range(100):
+        outbox.put(str(number), "/a")
+    outbox.put("other", "/b")
+    outbox.put("answer", None)
+    taken = []
+    while (frame := outbox.take()) is not None:
+        taken.append(frame)
+    assert taken[0] == "answer"
+    assert taken[1:] == [*(str(number) for number in range(68, 100)), "other"]
+    outbox.put("x" * 900, "/a")
+    outbox.put("y" * 900, "/b")
+    assert outbox.take() == "y" * 900
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")
+def test_tls(tmp_path: Path) -> None:
+    import ssl
+
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+         "-keyout", key, "-out", certificate, "-days", "1", "-subj", "/CN=localhost",
+         "-addext", "subjectAltName=IP:127.0.0.1"],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    with serving(ServerConfig(port=0, certificate=certificate, key=key)) as server:
+        context = ssl.create_default_context(cafile=certificate)
+        assert server.server.address.startswith("wss://")
+        with connect(server.server.address, ssl=context) as client:
+            assert topics(client)["result"]
+
+
+def test_a_port_that_is_taken_is_a_sentence() -> None:
+    with serving(ServerConfig(port=0)) as server:
+        port = int(server.server.address.rpartition(":")[2])
+        clock = Clock()
+        with Bus.open(clock) as bus, pytest.raises(BridgeError, match="cannot listen"):
+            Rosbridge(LiveBus(bus, clock, use_sim_time=False), ServerConfig(port=port), BridgeConfig())

@@ -1,0 +1,92 @@
+"""`twin rosbridge`: topics, services and actions for web clients, and the operator's page."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twin.cli.ros.joining import PATIENCE_S, Joining, joins
+
+
+@joins
+def rosbridge(
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Where clients connect; 0: any free one.")
+    ] = 9090,
+    address: Annotated[
+        str, typer.Option(metavar="IP", help="Of this computer; another than loopback needs --token.")
+    ] = "127.0.0.1",
+    token: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", exists=True, dir_okay=False, help="Who may come in: lines of TOKEN ROLE [NAME]."
+        ),
+    ] = None,
+    origin: Annotated[
+        list[str] | None,
+        typer.Option(metavar="URL", help="Pages of this server may connect; null: pages from files."),
+    ] = None,
+    host: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="By which this computer is called.")
+    ] = None,
+    certificate: Annotated[
+        Path | None, typer.Option(metavar="PEM", exists=True, dir_okay=False, help="For TLS.")
+    ] = None,
+    key: Annotated[
+        Path | None, typer.Option(metavar="PEM", exists=True, dir_okay=False, help="Of the certificate.")
+    ] = None,
+    audit: Annotated[
+        Path, typer.Option(metavar="FILE", help="Where commands are written down, as JSON lines.")
+    ] = Path("runs/rosbridge.jsonl"),
+    lease: Annotated[
+        float, typer.Option(metavar="S", min=0.5, help="Who steers does so alone, and so long after.")
+    ] = 3.0,
+    watchdog: Annotated[
+        float, typer.Option(metavar="S", min=0.1, help="Who steers and is silent so long is stopped.")
+    ] = 0.5,
+    max_message: Annotated[
+        int, typer.Option(metavar="BYTES", min=1000, help="Of a message from a client.")
+    ] = 1_000_000,
+    max_rate: Annotated[
+        float, typer.Option(metavar="HZ", min=1.0, help="Of messages from a client.")
+    ] = 100.0,
+    max_clients: Annotated[int, typer.Option(min=1, help="At a time.")] = 50,
+    parent: Annotated[int, typer.Option(hidden=True, help="End when this process does.")] = 0,
+    *,
+    joining: Joining,
+) -> None:
+    """Let web clients take part in a graph: rosbridge v2, and the operator's page, on one port."""
+    from twin.bridge.programs.console_log import show_log
+    from twin.bridge.wire.interrupts import noted_signals
+    from twin.web.rosbridge.access import read_tokens
+    from twin.web.rosbridge.bridge import BridgeConfig, Limits
+    from twin.web.rosbridge.control import ControlConfig
+    from twin.web.rosbridge.process import PAGE, Rosbridge, audit_file
+    from twin.web.rosbridge.server import ServerConfig
+
+    show_log()
+    config = ServerConfig(
+        address=address,
+        port=port,
+        tokens=read_tokens(token) if token else (),
+        origins=tuple(origin or ()),
+        hosts=tuple(host or ()),
+        certificate=certificate,
+        key=key,
+        folders={"": PAGE},
+    )
+    bridging = BridgeConfig(
+        Limits(message_bytes=max_message, messages_per_s=max_rate, clients=max_clients),
+        ControlConfig(lease_s=lease, watchdog_s=watchdog),
+        audit_file(audit),
+    )
+    with joining.open(PATIENCE_S) as process, noted_signals() as received:
+        bridge = Rosbridge(process, config, bridging)
+        try:
+            typer.echo(f"rosbridge listens on {bridge.server.address}; Ctrl-C ends it")
+            bridge.spin(lambda: bool(received) or (parent > 0 and os.getppid() != parent))
+        finally:
+            bridge.close()

@@ -1,0 +1,199 @@
+/** The operator's page: what stands where. */
+
+import { html, render, useEffect, useReducer, useRef, useState } from "ui";
+import { Drive } from "./drive.js";
+import { MapCanvas } from "./map.js";
+import { Rosbridge } from "./rosbridge.js";
+import { Station } from "./station.js";
+import { yawOf } from "./transforms.js";
+import { wordsOf } from "./words.js";
+
+const SILENT_S = 2;
+const kept = (key, otherwise) => localStorage.getItem(`twin.${key}`) ?? otherwise;
+const keep = (key, value) => localStorage.setItem(`twin.${key}`, value);
+const clock = (seconds) => seconds === null || seconds === undefined ? "–" : `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
+
+function EmergencyStop({ station, t }) {
+  const dialog = useRef();
+  const stopped = station.stopped, robots = [...station.robots.values()];
+  const asked = robots.some((robot) => robot.stopAsked);
+  if (!stopped.length)
+    return html`<button id="stop" class="stop" onClick=${() => station.stop()} disabled=${!robots.some((robot) => robot.guard)}
+      title=${robots.some((robot) => robot.guard) ? t("stop") : t("noStop")}>${asked ? t("stopping") : t("stopShort")}</button>`;
+  return html`
+    <button id="release" class="stop latched" onClick=${() => dialog.current.showModal()} aria-label=${t("release")}>${t("release")}</button>
+    <dialog ref=${dialog} aria-labelledby="release-title">
+      <h2 id="release-title">${t("releaseAsk")}</h2>
+      <p>${stopped.map((robot) => html`${robot.name}: ${t("stopped")} ${robot.guard.stoppedBy}<br />`)}</p>
+      <p>${t("releaseText")}</p>
+      <div class="row end">
+        <button onClick=${() => dialog.current.close()}>${t("cancel")}</button>
+        <button id="release-confirm" class="primary" onClick=${() => { station.release(); dialog.current.close(); }}>${t("release")}</button>
+      </div>
+    </dialog>`;
+}
+
+function Control({ station, t }) {
+  const control = station.control;
+  if (!control) return null;
+  const mine = control.holder && control.holder_id === control.own;
+  const words = mine ? t("controlMine") : control.holder ? `${control.holder} ${t("controlOther")}` : t("controlNone");
+  const command = mine ? "release" : control.holder ? "take_over" : "take";
+  return html`<div class="control"><span class=${mine ? "good" : ""}>${words}</span>
+    <button onClick=${() => station.take(command)}>${t(mine ? "giveBack" : control.holder ? "takeOver" : "take")}</button></div>`;
+}
+
+function Header({ station, t, theme, setTheme, language, setLanguage }) {
+  const age = (performance.now() - station.ros.heard) / 1000, up = station.ros.connected, silent = up && age > SILENT_S;
+  const { time, factor } = station.clock;
+  return html`
+    <header>
+      <div class="brand"><img src="icon.svg" alt="" width="28" height="28" /><h1>${t("title")}</h1>
+        ${station.robot?.label && html`<span class="badge">${station.robot.label}</span>`}</div>
+      <div class="lamp ${up ? (silent ? "warn" : "good") : "bad"}" role="status"><span class="dot"></span>
+        <span class="lamp-words">${up ? (silent ? `${t("silent")} ${age.toFixed(0)} s` : t("connected")) : t("disconnected")}</span></div>
+      <dl class="figures wide"><div><dt>${t("time")}</dt><dd>${clock(time)}</dd></div>
+        <div><dt>${t("pace")}</dt><dd>${factor === null ? "–" : `${factor.toFixed(1)}×`}</dd></div></dl>
+      ${station.robots.size > 1 && html`<select aria-label=${t("robot")} value=${station.selected} onChange=${(event) => station.select(event.target.value)}>
+        ${[...station.robots.values()].map((robot) => html`<option value=${robot.space}>${robot.name}</option>`)}</select>`}
+      <span class="grow"></span>
+      <div class="wide"><${Control} station=${station} t=${t} /></div>
+      <button class="plain" id="language" lang=${language === "en" ? "zh" : "en"} onClick=${() => setLanguage(language === "en" ? "zh" : "en")}>${t("language")}</button>
+      <button class="plain" id="theme" aria-label=${t("theme")} title=${t("theme")} onClick=${() => setTheme(theme === "dark" ? "light" : "dark")}>${theme === "dark" ? "☀" : "☾"}</button>
+      <${EmergencyStop} station=${station} t=${t} />
+    </header>`;
+}
+
+function Banner({ station, t }) {
+  const stopped = station.stopped;
+  if (!stopped.length) return null;
+  return html`<div class="banner" role="alert">${stopped.map((robot) => html`<span>${t("stop")}: ${robot.name} – ${t("stopped")} ${robot.guard.stoppedBy} </span>`)}</div>`;
+}
+
+function RobotCard({ station, t }) {
+  const robot = station.robot;
+  if (!robot) return html`<section class="card"><p class="muted">${t("waiting")}</p></section>`;
+  const { p, q } = robot.pose.pose, charge = robot.battery?.percentage;
+  const figures = [
+    [t("speed"), `${robot.velocity.linear.toFixed(2)} m/s`], [t("turn"), `${robot.velocity.angular.toFixed(2)} rad/s`],
+    [t("position"), `${p[0].toFixed(2)}, ${p[1].toFixed(2)} m · ${Math.round(yawOf(q) * 180 / Math.PI)}°`],
+    [t("quality"), robot.spread === undefined ? "–" : `${(robot.spread * 100).toFixed(0)} cm`],
+  ];
+  return html`<section class="card" aria-label=${t("robot")}>
+    <div class="row"><h2>${robot.name}</h2><span class="grow"></span>
+      ${charge >= 0 && html`<span class="battery ${charge < 0.2 ? "bad" : ""}">${t("battery")} <meter min="0" max="1" low="0.2" value=${charge} aria-label=${t("battery")}></meter> ${Math.round(charge * 100)} %</span>`}</div>
+    <dl class="figures grid">${figures.map(([name, value]) => html`<div><dt>${name}</dt><dd>${value}</dd></div>`)}</dl>
+  </section>`;
+}
+
+function Tasks({ station, t }) {
+  const states = station.robot?.mission ?? [];
+  const add = (event) => {
+    event.preventDefault();
+    const value = (name) => Number(event.target.elements[name].value) || 0;
+    station.add(value("x"), value("y"), (value("heading") * Math.PI) / 180);
+  };
+  return html`
+    <h3>${t("mission")}</h3>
+    ${states.length ? html`<ol class="steps">${states.slice(-8).map((step, i, all) => html`<li class=${i === all.length - 1 ? "now" : ""}><time>${clock(step.time)}</time> ${step.state}</li>`)}</ol>` : html`<p class="muted">${t("noMission")}</p>`}
+    <h3>${t("queue")}</h3>
+    <p class="muted">${t("queueNote")}</p>
+    ${station.queue.length === 0 && html`<p class="muted">${t("empty")}</p>`}
+    <ul class="list" id="queue">${station.queue.map((goal) => html`<li key=${goal.id} data-state=${goal.state}>
+      <div class="grow"><b>${goal.x.toFixed(2)}, ${goal.y.toFixed(2)}</b> · ${Math.round((goal.yaw * 180) / Math.PI)}°<br />
+        <span class="state ${goal.state}">${t(goal.state === "waiting" ? "state_waiting" : goal.state)}${goal.state === "active" && goal.left !== undefined ? ` · ${goal.left.toFixed(1)} ${t("left")}` : ""} ${goal.why ?? ""}</span></div>
+      ${goal.state === "waiting" && html`<button class="icon" aria-label=${t("earlier")} onClick=${() => station.move(goal.id, -1)}>↑</button><button class="icon" aria-label=${t("later")} onClick=${() => station.move(goal.id, 1)}>↓</button>`}
+      <button class="icon" aria-label=${t("cancel")} onClick=${() => station.cancel(goal.id)}>✕</button></li>`)}</ul>
+    <form class="row" onSubmit=${add}>
+      ${["x", "y", "heading"].map((name) => html`<label class="small">${t(name)}<input name=${name} type="number" step="any" value="0" /></label>`)}
+      <button>${t("add")}</button></form>
+    ${station.holding ? html`<button onClick=${() => station.resumeQueue()}>${t("resume")}</button>` : station.queue.length > 0 && html`<button onClick=${() => station.pauseQueue()}>${t("hold_")}</button>`}`;
+}
+
+function Alarms({ station, t }) {
+  const alarms = [...station.alarms.values()].sort((a, b) => a.acknowledged - b.acknowledged || b.time - a.time);
+  if (!alarms.length) return html`<p class="muted">${t("noAlarms")}</p>`;
+  return html`<ul class="list" id="alarm-list">${alarms.map((alarm) => html`<li key=${alarm.key} class="alarm ${alarm.level} ${alarm.acknowledged ? "known" : ""}">
+    <div class="grow"><time>${clock(alarm.time)}</time> ${alarm.key === "connection" ? t("connection") : alarm.text} ${!alarm.active && html`<i>(${t("over")})</i>`}</div>
+    ${alarm.acknowledged ? html`<span class="muted">${t("acknowledged")}</span>` : html`<button onClick=${() => station.acknowledge(alarm.key)}>${t("acknowledge")}</button>`}</li>`)}</ul>`;
+}
+
+function Log({ station, t }) {
+  if (!station.log.length) return html`<p class="muted">${t("noLog")}</p>`;
+  return html`<ol class="log">${station.log.map((line) => html`<li key=${line.key} class=${line.level}><time>${clock(line.time)}</time> <b>${line.source}</b> ${line.text}</li>`)}</ol>`;
+}
+
+function Camera({ station, t }) {
+  if (!station.cameras.size) return html`<p class="muted">${t("noCamera")}</p>`;
+  return [...station.cameras].map(([topic, url]) => html`<figure><img class="camera" src=${url} alt=${topic} /><figcaption class="muted">${topic}</figcaption></figure>`);
+}
+
+/** A component of a module that is loaded when it is first shown: three and uPlot are large. */
+function Lazy({ load, ...props }) {
+  const [loaded, setLoaded] = useState(null);
+  useEffect(() => { load().then((component) => setLoaded(() => component)); }, []);
+  return loaded && html`<${loaded} ...${props} />`;
+}
+
+const PANELS = { drive: Drive, tasks: Tasks, alarms: Alarms, log: Log, plot: (props) => html`<${Lazy} load=${() => import("./plot.js").then((m) => m.Plot)} ...${props} />`, camera: Camera };
+
+function Panels({ station, t, panel, setPanel }) {
+  const Panel = PANELS[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
+  const names = Object.keys(PANELS);
+  const turn = (event) => {
+    const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!by) return;
+    const next = names[(names.indexOf(panel) + by + names.length) % names.length];
+    setPanel(next);
+    document.getElementById(`tab-${next}`).focus();
+  };
+  return html`<section class="card panels">
+    <div role="tablist" aria-label=${t("panels")} onKeyDown=${turn}>${names.map((name) => html`<button role="tab" id="tab-${name}" aria-selected=${panel === name} aria-controls="panel" tabindex=${panel === name ? 0 : -1} onClick=${() => setPanel(name)}>${t(name)}${name === "alarms" && open > 0 && html` <span class="count">${open}</span>`}</button>`)}</div>
+    <div role="tabpanel" id="panel" aria-labelledby="tab-${panel}" tabindex="0"><${Panel} key=${panel} station=${station} t=${t} /></div></section>`;
+}
+
+function Stage({ station, t }) {
+  const [tool, setTool] = useState("pan"), [mode, setMode] = useState("map"), [follow, setFollow] = useState(false);
+  const [layers, setLayers] = useState({ costmap: true, scan: true, plan: true, zones: true });
+  const view = useRef();
+  const set = (x, y, yaw) => {
+    if (tool === "pose") station.estimate(x, y, yaw);
+    else station.add(x, y, yaw, { now: tool === "goal" });
+    if (tool !== "waypoint") setTool("pan");
+  };
+  const hints = { goal: "hintGoal", pose: "hintPose", waypoint: "hintWaypoint" };
+  const toggle = (name, pressed, action) => html`<button id="tool-${name}" aria-pressed=${pressed} onClick=${action}>${t(name)}</button>`;
+  return html`<section class="stage" aria-label=${t("map")}>
+    ${mode === "map" ? html`<${MapCanvas} station=${station} tool=${tool} layers=${layers} follow=${follow} label=${t("mapLabel")} hold=${(it) => (view.current = it)} onset=${set} onpan=${() => setFollow(false)} />`
+      : html`<${Lazy} load=${() => import("./scene.js").then((m) => m.Scene)} station=${station} label=${t("sceneLabel")} />`}
+    <div class="bar top" role="toolbar" aria-label=${t("tools")}>
+      ${toggle("view3d", mode === "3d", () => setMode(mode === "map" ? "3d" : "map"))}
+      ${mode === "map" && ["goal", "waypoint", "pose"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
+    ${mode === "map" && hints[tool] && html`<div class="hint" role="status">${t(hints[tool])}</div>`}
+    ${mode === "map" && html`<div class="bar bottom" role="toolbar" aria-label=${t("layers")}>
+      <button class="icon" aria-label=${t("zoomOut")} onClick=${() => view.current.zoom(0.8)}>−</button><button class="icon" aria-label=${t("zoomIn")} onClick=${() => view.current.zoom(1.25)}>+</button>
+      <button onClick=${() => { setFollow(false); view.current.fit(); }}>${t("fit")}</button>${toggle("follow", follow, () => setFollow(!follow))}
+      <span class="wide layers">${Object.keys(layers).map((name) => toggle(name, layers[name], () => setLayers({ ...layers, [name]: !layers[name] })))}</span></div>`}
+  </section>`;
+}
+
+function App({ station }) {
+  const [, refresh] = useReducer((count) => count + 1, 0);
+  const [language, setLanguage] = useState(kept("language", navigator.language.startsWith("zh") ? "zh" : "en"));
+  const [theme, setTheme] = useState(kept("theme", matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+  const [panel, setPanel] = useState("drive");
+  useEffect(() => { station.addEventListener("change", refresh); return () => station.removeEventListener("change", refresh); }, []);
+  useEffect(() => { document.documentElement.lang = language; keep("language", language); }, [language]);
+  useEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
+  const t = wordsOf(language), props = { station, t };
+  return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} />
+    <${Banner} ...${props} />
+    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
+}
+
+const token = new URLSearchParams(location.search).get("token");
+const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/${token ? `?token=${encodeURIComponent(token)}` : ""}`;
+const station = new Station(new Rosbridge(url), kept("name", `page ${Math.floor(Math.random() * 900 + 100)}`));
+keep("name", station.name);
+station.ros.addEventListener("connection", () => station.ros.connected && station.take(""));
+render(html`<${App} station=${station} />`, document.getElementById("app"));

@@ -1,0 +1,282 @@
+/** The hall from above, on a canvas: grids, scan, plan, robots; goals and poses are set by click and drag. */
+
+import { html, useLayoutEffect, useRef } from "ui";
+import { compose, place, poseOf, yawOf } from "./transforms.js";
+
+const DRAG_PX = 8;
+const TURNED = 1.1;
+
+/** Grid as a picture: free, occupied and unknown of a map; cost of a costmap, clear where it is free. */
+function picture(grid, kind, colours) {
+  const { width, height } = grid.info;
+  const canvas = document.createElement("canvas");
+  canvas.width = width;
+  canvas.height = height;
+  const image = new ImageData(width, height);
+  for (let i = 0; i < width * height; i++) {
+    const value = grid.data[i];
+    const at = 4 * ((height - 1 - Math.floor(i / width)) * width + (i % width));
+    const rgba = kind === "map" ? (value < 0 ? colours.unknown : value > 50 ? colours.wall : colours.free)
+      : value <= 0 ? [0, 0, 0, 0] : kind === "zones" ? [...colours.zone, 90]
+      : value >= 99 ? [...colours.lethal, 90] : [...colours.cost, 10 + 0.7 * value];
+    image.data.set(rgba, at);
+  }
+  canvas.getContext("2d").putImageData(image, 0, 0);
+  return canvas;
+}
+
+function hex(name) {
+  const text = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  return [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16));
+}
+
+export class MapView {
+  constructor(canvas, station) {
+    this.canvas = canvas;
+    this.station = station;
+    this.scale = 40; // px per m
+    this.centre = [0, 0];
+    this.layers = {};
+    this.tool = "pan";
+    this._pictures = new Map();
+    this._pointers = new Map();
+    canvas.addEventListener("pointerdown", (event) => this._down(event));
+    canvas.addEventListener("pointermove", (event) => this._move(event));
+    canvas.addEventListener("pointerup", (event) => this._up(event));
+    canvas.addEventListener("pointercancel", (event) => this._pointers.delete(event.pointerId));
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this._zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
+    }, { passive: false });
+    canvas.addEventListener("keydown", (event) => this._key(event));
+  }
+
+  fit() {
+    const grid = this.station.robot?.grids.map?.message;
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    if (!grid) return false;
+    const { width, height, resolution, origin } = grid.info;
+    this.scale = Math.min(w / (width * resolution), h / (height * resolution)) * 0.94;
+    this.centre = [origin.position.x + width * resolution / 2, origin.position.y + height * resolution / 2];
+    return true;
+  }
+
+  zoom(by) {
+    this._zoom(by, this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+  }
+
+  world(x, y) {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    return [this.centre[0] + (x - w / 2) / this.scale, this.centre[1] - (y - h / 2) / this.scale];
+  }
+
+  pixel([x, y]) {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    return [w / 2 + (x - this.centre[0]) * this.scale, h / 2 - (y - this.centre[1]) * this.scale];
+  }
+
+  _zoom(by, x, y) {
+    const before = this.world(x, y);
+    this.scale = Math.min(400, Math.max(4, this.scale * by));
+    const after = this.world(x, y);
+    this.centre = [this.centre[0] + before[0] - after[0], this.centre[1] + before[1] - after[1]];
+  }
+
+  _key(event) {
+    const step = 60 / this.scale;
+    const moves = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
+    if (moves[event.key]) this.centre = this.centre.map((value, i) => value + moves[event.key][i]);
+    else if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
+    else return;
+    this.onpan?.();
+    event.preventDefault();
+  }
+
+  _down(event) {
+    this.canvas.setPointerCapture(event.pointerId);
+    this._pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
+    if (this.tool !== "pan" && this._pointers.size === 1) this.drag = { from: [event.offsetX, event.offsetY], to: [event.offsetX, event.offsetY] };
+    else this.drag = null;
+  }
+
+  _move(event) {
+    const before = this._pointers.get(event.pointerId);
+    if (!before) return;
+    const now = [event.offsetX, event.offsetY];
+    if (this.drag) this.drag.to = now;
+    else if (this._pointers.size === 1) {
+      this.centre = [this.centre[0] - (now[0] - before[0]) / this.scale, this.centre[1] + (now[1] - before[1]) / this.scale];
+      this.onpan?.();
+    } else {
+      const other = [...this._pointers].find(([id]) => id !== event.pointerId)[1];
+      const spread = (point) => Math.max(1, Math.hypot(point[0] - other[0], point[1] - other[1]));
+      this._zoom(spread(now) / spread(before), other[0], other[1]);
+    }
+    this._pointers.set(event.pointerId, now);
+  }
+
+  _up(event) {
+    this._pointers.delete(event.pointerId);
+    if (!this.drag) return;
+    const [x, y] = this.world(...this.drag.from);
+    this.onset?.(x, y, this._heading());
+    this.drag = null;
+  }
+
+  _heading() {
+    const [dx, dy] = [this.drag.to[0] - this.drag.from[0], this.drag.from[1] - this.drag.to[1]];
+    if (Math.hypot(dx, dy) > DRAG_PX) return Math.atan2(dy, dx);
+    return this.station.robot ? yawOf(this.station.robot.pose.pose.q) : 0;
+  }
+
+  draw() {
+    const { canvas, station } = this, ratio = window.devicePixelRatio || 1;
+    const { clientWidth: w, clientHeight: h } = canvas;
+    if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
+      canvas.width = Math.round(w * ratio);
+      canvas.height = Math.round(h * ratio);
+    }
+    const c = canvas.getContext("2d");
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name) => style.getPropertyValue(`--${name}`).trim();
+    c.fillStyle = colour("map-unknown");
+    c.fillRect(0, 0, w, h);
+    const robot = station.robot;
+    if (!robot) return;
+    if (this.follow) this.centre = robot.pose.pose.p.slice(0, 2);
+    for (const kind of ["map", "zones", "global", "local"])
+      if (robot.grids[kind] && (kind === "map" || this.layers[kind === "zones" ? "zones" : "costmap"])) this._grid(c, robot, kind);
+    this._metres(c, w, h, colour);
+    if (this.layers.scan && robot.scan) {
+      c.fillStyle = colour("scan");
+      for (const point of robot.scan) {
+        const [x, y] = this.pixel(point);
+        c.fillRect(x - 1.25, y - 1.25, 2.5, 2.5);
+      }
+    }
+    if (this.layers.plan && robot.plan?.poses.length) {
+      c.strokeStyle = colour("plan");
+      c.lineWidth = 2.5;
+      this._line(c, robot.plan.poses.map(({ pose }) => [pose.position.x, pose.position.y]));
+    }
+    this._things(c, robot, robot.goods, 0.15, colour("goods"));
+    this._things(c, robot, robot.people, 0.25, colour("people"));
+    station.queue.filter((goal) => goal.state === "active" || goal.state === "waiting").forEach((goal, i) => this._flag(c, [goal.x, goal.y], goal.yaw, colour("accent"), goal.state === "active" ? "" : String(i + 1)));
+    for (const each of station.robots.values()) this._robot(c, each, each === robot, colour);
+    if (this.drag) this._flag(c, this.world(...this.drag.from), this._heading(), colour(this.tool === "pose" ? "good" : "accent"), "");
+  }
+
+  _grid(c, robot, kind) {
+    const { message, version } = robot.grids[kind];
+    const theme = document.documentElement.dataset.theme;
+    const key = `${robot.space} ${kind}`;
+    if (this._pictures.get(key)?.tag !== `${version} ${theme}`) {
+      const colours = { unknown: [...hex("--map-unknown"), 255], free: [...hex("--map-free"), 255], wall: [...hex("--map-wall"), 255], lethal: hex("--cost-lethal"), cost: hex("--cost"), zone: hex("--zone") };
+      this._pictures.set(key, { tag: `${version} ${theme}`, image: picture(message, kind, colours) });
+    }
+    const { resolution, width, height, origin } = message.info;
+    const frame = robot.frames.lookup(message.header.frame_id).pose;
+    const pose = compose(frame, poseOf(origin));
+    const [x, y] = this.pixel(pose.p);
+    c.save();
+    c.translate(x, y);
+    c.rotate(-yawOf(pose.q));
+    c.imageSmoothingEnabled = this.scale * resolution < TURNED;
+    c.drawImage(this._pictures.get(key).image, 0, -height * resolution * this.scale, width * resolution * this.scale, height * resolution * this.scale);
+    c.restore();
+  }
+
+  /** A ruler in the corner. */
+  _metres(c, w, h, colour) {
+    const length = [0.5, 1, 2, 5, 10, 20, 50].find((metres) => metres * this.scale > 60) ?? 100;
+    const left = w - 16 - length * this.scale;
+    c.strokeStyle = c.fillStyle = colour("muted");
+    c.lineWidth = 2;
+    c.beginPath();
+    c.moveTo(left, h - 20);
+    c.lineTo(left, h - 14);
+    c.lineTo(w - 16, h - 14);
+    c.lineTo(w - 16, h - 20);
+    c.stroke();
+    c.font = "12px system-ui, sans-serif";
+    c.textAlign = "center";
+    c.fillText(`${length} m`, left + (length * this.scale) / 2, h - 20);
+  }
+
+  _line(c, points, close = false) {
+    c.beginPath();
+    points.forEach((point) => c.lineTo(...this.pixel(point)));
+    if (close) c.closePath();
+    c.stroke();
+  }
+
+  _things(c, robot, message, half, colour) {
+    if (!message) return;
+    c.strokeStyle = colour;
+    c.lineWidth = 2;
+    const { pose } = robot.frames.lookup(message.header.frame_id);
+    for (const each of message.poses) {
+      const at = compose(pose, poseOf(each));
+      this._line(c, [[-half, -half], [half, -half], [half, half], [-half, half]].map((corner) => place(at, [...corner, 0])), true);
+    }
+  }
+
+  _flag(c, at, yaw, colour, text) {
+    const [x, y] = this.pixel(at);
+    c.strokeStyle = c.fillStyle = colour;
+    c.lineWidth = 2.5;
+    c.beginPath();
+    c.arc(x, y, 9, 0, 2 * Math.PI);
+    c.moveTo(x, y);
+    const [tx, ty] = [x + 28 * Math.cos(yaw), y - 28 * Math.sin(yaw)];
+    c.lineTo(tx, ty);
+    c.stroke();
+    c.beginPath();
+    for (const turn of [0, 2.5, -2.5]) c.lineTo(tx + 7 * Math.cos(yaw + turn), ty - 7 * Math.sin(yaw + turn));
+    c.fill();
+    c.font = "bold 12px system-ui, sans-serif";
+    c.textAlign = "center";
+    if (text) c.fillText(text, x - 16, y - 8);
+  }
+
+  _robot(c, robot, selected, colour) {
+    const { pose } = robot.pose;
+    const stopped = Boolean(robot.guard?.stoppedBy);
+    c.strokeStyle = c.fillStyle = colour(stopped ? "bad" : selected ? "robot" : "muted");
+    c.lineWidth = 2;
+    if (robot.footprint) {
+      const frame = robot.frames.lookup(robot.footprint.header.frame_id).pose;
+      this._line(c, robot.footprint.polygon.points.map(({ x, y, z }) => place(frame, [x, y, z])), true);
+    }
+    const size = Math.max(0.22, 9 / this.scale);
+    c.beginPath();
+    [[1, 0], [-0.8, 0.7], [-0.4, 0], [-0.8, -0.7]].forEach(([x, y]) => c.lineTo(...this.pixel(place(pose, [x * size, y * size, 0]))));
+    c.fill();
+    if (this.station.robots.size > 1) {
+      const [x, y] = this.pixel(pose.p);
+      c.font = "12px system-ui, sans-serif";
+      c.textAlign = "center";
+      c.fillText(robot.name, x, y - 20);
+    }
+  }
+}
+
+/** The canvas as a component; `hold` is given the view. */
+export function MapCanvas({ station, tool, layers, follow, label, hold, onset, onpan }) {
+  const canvas = useRef(), view = useRef();
+  useLayoutEffect(() => {
+    view.current = new MapView(canvas.current, station);
+    hold(view.current);
+    let frame, fitted = false;
+    const loop = () => {
+      if (!fitted) fitted = view.current.fit();
+      view.current.draw();
+      frame = requestAnimationFrame(loop);
+    };
+    loop();
+    return () => cancelAnimationFrame(frame);
+  }, []);
+  useLayoutEffect(() => void Object.assign(view.current, { tool, layers, follow, onset, onpan }));
+  return html`<canvas ref=${canvas} class="map tool-${tool}" tabindex="0" role="img" aria-label=${label}></canvas>`;
+}

@@ -1,0 +1,370 @@
+/** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
+
+import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
+
+const GRAPH_MS = 3000;
+const LOG_LINES = 300;
+const GRID = "nav_msgs/msg/OccupancyGrid";
+const LEVELS = { 10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal" };
+const GOAL = { name: "navigate_to_pose", type: "nav2_msgs/action/NavigateToPose" };
+const SUCCEEDED = 4, CANCELED = 5;
+const STOP_AGAIN_MS = 200;
+
+/** A robot: everything below one namespace. */
+class Robot {
+  constructor(space) {
+    this.space = space;
+    this.name = space.slice(1) || "robot";
+    this.frames = new Frames();
+    this.base = "base_footprint";
+    this.velocity = { linear: 0, angular: 0 };
+    this.grids = {}; // map, global, local -> {message, version}
+    this.mission = []; // {state, time}
+    this.trail = [];
+  }
+
+  /** {root, pose} of the base. */
+  get pose() {
+    return this.frames.lookup(this.base);
+  }
+}
+
+export class Station extends EventTarget {
+  constructor(ros, name) {
+    super();
+    this.ros = ros;
+    this.name = name;
+    this.robots = new Map();
+    this.selected = "";
+    this.types = new Map(); // topic -> type
+    this.log = [];
+    this.alarms = new Map(); // key -> {level, text, time, active, acknowledged}
+    this.clock = { time: null, factor: null };
+    this.control = null; // twin_msgs/Control, and own id
+    this.queue = []; // {id, x, y, yaw, state: waiting | active | succeeded | canceled | failed, left}
+    this.holding = false;
+    this.cameras = new Map(); // topic -> data URL
+    this._goals = 0;
+    this._heard = new Set();
+    ros.addEventListener("connection", () => this._connection());
+    ros.addEventListener("status", ({ detail }) => this.note(detail.level, "rosbridge", detail.msg));
+    setInterval(() => this._look(), GRAPH_MS);
+    setInterval(() => this.changed(), 500); // ages of what was heard
+  }
+
+  get robot() {
+    return this.robots.get(this.selected);
+  }
+
+  select(space) {
+    this.selected = space;
+    this.changed();
+  }
+
+  changed() {
+    if (this._pending) return;
+    this._pending = setTimeout(() => {
+      this._pending = 0;
+      this.dispatchEvent(new Event("change"));
+    }, 60);
+  }
+
+  note(level, source, text, time = this.clock.time) {
+    this.log.unshift({ level, source, text, time, key: ++this._goals });
+    this.log.length = Math.min(this.log.length, LOG_LINES);
+    this.changed();
+  }
+
+  /** Raise or end an alarm. */
+  alarm(key, level, text, active = true) {
+    const known = this.alarms.get(key);
+    if (!active && !known?.active) return;
+    const again = active && !(known?.active && known.text === text && known.level === level);
+    this.alarms.set(key, {
+      key, level, text: active ? text : known.text, active,
+      time: again ? this.clock.time : known.time,
+      acknowledged: again ? false : known.acknowledged,
+    });
+    this.changed();
+  }
+
+  acknowledge(key) {
+    const alarm = this.alarms.get(key);
+    if (alarm?.active) alarm.acknowledged = true;
+    else this.alarms.delete(key);
+    this.changed();
+  }
+
+  _connection() {
+    if (this.ros.connected) this._look();
+    else this.queue.forEach((goal) => goal.state === "active" && (goal.state = "failed"));
+    this.alarm("connection", "error", "connection", !this.ros.connected);
+    this.changed();
+  }
+
+  async _look() {
+    if (!this.ros.connected) return;
+    try {
+      const found = await this.ros.call("/rosapi/topics", "rosapi_msgs/srv/Topics");
+      this.types = new Map(found.topics.map((topic, i) => [topic, found.types[i]]));
+      const { services } = await this.ros.call("/rosapi/services", "rosapi_msgs/srv/Services");
+      this.services = new Set(services);
+      const { action_servers } = await this.ros.call("/rosapi/action_servers", "rosapi_msgs/srv/GetActionServers").catch(() => ({ action_servers: [] }));
+      this.actions = new Set(action_servers);
+    } catch (error) {
+      this.note("warn", "rosapi", error.message);
+      return;
+    }
+    for (const [topic, type] of this.types) this._hear(topic, type);
+    if (!this.robots.has(this.selected) && this.robots.size) this.selected = [...this.robots.keys()].sort()[0];
+    this.changed();
+  }
+
+  _robot(space) {
+    if (!this.robots.has(space)) this.robots.set(space, new Robot(space));
+    return this.robots.get(space);
+  }
+
+  /** The robot to which a topic belongs: the longest namespace of one that begins its name. */
+  _owner(topic) {
+    const spaces = [...this.robots.keys()].filter((space) => topic.startsWith(`${space}/`));
+    return this.robots.get(spaces.sort((a, b) => b.length - a.length)[0]);
+  }
+
+  _hear(topic, type) {
+    if (this._heard.has(topic)) return;
+    const at = topic.lastIndexOf("/");
+    const space = topic.slice(0, at), last = topic.slice(at + 1);
+    const hear = (callback, throttle) => {
+      this._heard.add(topic);
+      this.ros.subscribe(topic, type, (msg) => {
+        callback(msg);
+        this.changed();
+      }, throttle);
+    };
+    const owned = (callback, throttle) => hear((msg) => {
+      const robot = this._owner(topic);
+      if (robot) callback(robot, msg);
+    }, throttle);
+
+    if (type === "nav_msgs/msg/Odometry" && last === "odom") {
+      const robot = this._robot(space);
+      hear((msg) => {
+        robot.base = msg.child_frame_id;
+        robot.odometry = msg;
+        robot.velocity = { linear: msg.twist.twist.linear.x, angular: msg.twist.twist.angular.z };
+      }, 100);
+    } else if (type === "tf2_msgs/msg/TFMessage" && (last === "tf" || last === "tf_static"))
+      hear((msg) => this._robotsIn(space).forEach((robot) => robot.frames.take(msg)), 0);
+    else if (type === GRID) {
+      const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask/.test(last) ? "zones" : "";
+      if (kind) {
+        const take = (robot, message) => (robot.grids[kind] = { message, version: (robot.grids[kind]?.version ?? 0) + 1 });
+        owned(take, kind === "map" ? 0 : 500);
+      }
+    } else if (type === "map_msgs/msg/OccupancyGridUpdate") {
+      const kind = topic.includes("global_costmap") ? "global" : topic.includes("local_costmap") ? "local" : "map";
+      owned((robot, msg) => patch(robot.grids[kind], msg));
+    } else if (type === "sensor_msgs/msg/LaserScan" && last === "scan") owned(takeScan, 150);
+    else if (type === "nav_msgs/msg/Path" && last === "plan") owned((robot, msg) => (robot.plan = msg), 200);
+    else if (type === "geometry_msgs/msg/PolygonStamped" && topic.endsWith("local_costmap/published_footprint"))
+      owned((robot, msg) => (robot.footprint = msg), 200);
+    else if (type === "sensor_msgs/msg/BatteryState") owned((robot, msg) => (robot.battery = msg), 1000);
+    else if (type === "sensor_msgs/msg/JointState" && last === "joint_states")
+      owned((robot, msg) => (robot.joints = msg), 100);
+    else if (type === "std_msgs/msg/String" && last === "robot_description") owned((robot, msg) => (robot.urdf = msg.data));
+    else if (type === "std_msgs/msg/String" && last === "label") owned((robot, msg) => (robot.label = msg.data));
+    else if (type === "std_msgs/msg/String" && topic.endsWith("mission/state"))
+      owned((robot, msg) => {
+        if (robot.mission.at(-1)?.state !== msg.data) robot.mission.push({ state: msg.data, time: this.clock.time });
+      });
+    else if (type === "geometry_msgs/msg/PoseArray" && last === "tote_poses") owned((robot, msg) => (robot.goods = msg), 500);
+    else if (type === "geometry_msgs/msg/PoseArray" && last === "people") owned((robot, msg) => (robot.people = msg), 200);
+    else if (type === "geometry_msgs/msg/PoseWithCovarianceStamped" && last === "amcl_pose")
+      owned((robot, msg) => (robot.spread = Math.sqrt(Math.max(0, msg.pose.covariance[0] + msg.pose.covariance[7]))), 200);
+    else if (type === "sensor_msgs/msg/CompressedImage")
+      hear((msg) => this.cameras.set(topic, `data:image/${/png/.test(msg.format) ? "png" : "jpeg"};base64,${msg.data}`), 200);
+    else if (type === "diagnostic_msgs/msg/DiagnosticArray" && topic.endsWith("guard/status"))
+      owned((robot, msg) => this._guard(robot, msg));
+    else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, s.level > 0)));
+    else if (topic === "/rosout")
+      hear((msg) => {
+        const level = LEVELS[msg.level] ?? "info";
+        this.note(level, msg.name, msg.msg, msg.stamp.sec + msg.stamp.nanosec * 1e-9);
+        if (msg.level >= 40) this.alarm(`log ${msg.name}`, "error", `${msg.name}: ${msg.msg}`);
+      });
+    else if (topic === "/clock") hear((msg) => this._time(msg.clock), 500);
+    else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
+  }
+
+  _robotsIn(space) {
+    return [...this.robots.values()].filter((robot) => !space || robot.space === space);
+  }
+
+  _time({ sec, nanosec }) {
+    const time = sec + nanosec * 1e-9, now = performance.now() / 1000;
+    const { time: before, at } = this.clock;
+    const factor = before !== null && now > at ? (time - before) / (now - at) : null;
+    this.clock = { time, at: now, factor: this.clock.factor === null ? factor : 0.7 * this.clock.factor + 0.3 * factor };
+  }
+
+  _guard(robot, message) {
+    const status = message.status.find((each) => each.name === "guard");
+    if (!status) return;
+    const by = status.values.find(({ key }) => key === "stopped_by")?.value ?? "";
+    robot.guard = { stoppedBy: by, stamp: message.header.stamp };
+    if (by) robot.stopAsked = 0;
+    this.alarm(`guard ${robot.space}`, "error", `${robot.name}: emergency stop (${by})`, Boolean(by));
+  }
+
+  /** Press the emergency stop of all robots; said again until each tells that it is stopped. */
+  stop() {
+    for (const robot of this.robots.values()) {
+      robot.stopAsked = performance.now();
+      const press = () => {
+        if (!robot.stopAsked) return;
+        this.ros.publish(`${robot.space}/guard/stop`, "std_msgs/msg/Header", { frame_id: this.name });
+        setTimeout(press, STOP_AGAIN_MS);
+      };
+      press();
+    }
+    this.pauseQueue();
+    this.changed();
+  }
+
+  /** Release what is stopped, by the status that the operator saw. */
+  release() {
+    for (const robot of this.robots.values())
+      if (robot.guard?.stoppedBy)
+        this.ros.publish(`${robot.space}/guard/release`, "std_msgs/msg/Header", { stamp: robot.guard.stamp, frame_id: this.name });
+  }
+
+  get stopped() {
+    return [...this.robots.values()].filter((robot) => robot.guard?.stoppedBy);
+  }
+
+  async take(command) {
+    try {
+      const { id, ...rest } = await this.ros.call("/twin/control", "twin_msgs/srv/Control", { command, name: this.name });
+      this.control = { ...rest, own: id };
+    } catch (error) {
+      this.note("warn", "control", error.message);
+    }
+    this.changed();
+  }
+
+  /** Topic and type for velocities by hand: before the multiplexer, if there is one. */
+  get teleop() {
+    const space = this.robot?.space ?? "";
+    const topic = ["cmd_vel_teleop", "cmd_vel"].map((name) => `${space}/${name}`).find((name) => this.types.has(name));
+    return topic && { topic, type: this.types.get(topic) };
+  }
+
+  drive(linear, angular) {
+    const { topic, type } = this.teleop ?? {};
+    if (!topic) return false;
+    const twist = { linear: { x: linear, y: 0, z: 0 }, angular: { x: 0, y: 0, z: angular } };
+    return this.ros.publish(topic, type, type.endsWith("TwistStamped") ? { header: { frame_id: this.robot.base }, twist } : twist);
+  }
+
+  estimate(x, y, yaw) {
+    const covariance = new Array(36).fill(0);
+    covariance[0] = covariance[7] = 0.25; // as RViz gives it: 0.5 m
+    covariance[35] = (Math.PI / 12) ** 2;
+    const robot = this.robot;
+    this.ros.publish(`${robot.space}/initialpose`, "geometry_msgs/msg/PoseWithCovarianceStamped", {
+      header: { frame_id: robot.pose.root },
+      pose: { pose: { position: { x, y, z: 0 }, orientation: quaternionOf(yaw) }, covariance },
+    });
+    this.note("info", "page", `2D pose estimate ${x.toFixed(2)} ${y.toFixed(2)} ${yaw.toFixed(2)}`);
+  }
+
+  /** Put a goal at the end of the queue, or in place of all of it. */
+  add(x, y, yaw, { now = false } = {}) {
+    if (now) this.clear();
+    this.queue.push({ id: ++this._goals, robot: this.robot, x, y, yaw, state: "waiting" });
+    if (now) this.holding = false;
+    this._next();
+  }
+
+  move(id, by) {
+    const from = this.queue.findIndex((goal) => goal.id === id), to = from + by;
+    if (this.queue[to]?.state !== "waiting") return;
+    [this.queue[from], this.queue[to]] = [this.queue[to], this.queue[from]];
+    this.changed();
+  }
+
+  cancel(id) {
+    const goal = this.queue.find((each) => each.id === id);
+    if (goal?.state === "active") goal.handle.cancel();
+    else this.queue = this.queue.filter((each) => each.id !== id);
+    this.changed();
+  }
+
+  clear() {
+    this.queue.filter((goal) => goal.state === "active").forEach((goal) => goal.handle.cancel());
+    this.queue = this.queue.filter((goal) => goal.state === "active");
+    this.changed();
+  }
+
+  pauseQueue() {
+    this.holding = true;
+    this.changed();
+  }
+
+  resumeQueue() {
+    this.holding = false;
+    this._next();
+  }
+
+  _next() {
+    this.changed();
+    for (const robot of this.robots.values()) {
+      if (this.holding || this.queue.some((goal) => goal.robot === robot && goal.state === "active")) continue;
+      const goal = this.queue.find((each) => each.robot === robot && each.state === "waiting");
+      if (goal) this._send(goal);
+    }
+  }
+
+  async _send(goal) {
+    goal.state = "active";
+    const pose = { position: { x: goal.x, y: goal.y, z: 0 }, orientation: quaternionOf(goal.yaw) };
+    const args = { pose: { header: { frame_id: goal.robot.pose.root }, pose } };
+    goal.handle = this.ros.goal(`${goal.robot.space}/${GOAL.name}`, GOAL.type, args, (feedback) => {
+      goal.left = feedback.distance_remaining;
+      this.changed();
+    });
+    try {
+      const { status, values } = await goal.handle.result;
+      goal.state = status === SUCCEEDED ? "succeeded" : status === CANCELED ? "canceled" : "failed";
+      goal.why = values?.error_msg ?? (typeof values === "string" ? values : "");
+    } catch (error) {
+      goal.state = "failed";
+      goal.why = error.message;
+    }
+    if (goal.state === "failed") {
+      this.holding = this.queue.some((each) => each.state === "waiting");
+      this.alarm(`goal ${goal.id}`, "warn", `goal ${goal.x.toFixed(1)}, ${goal.y.toFixed(1)}: ${goal.why || "failed"}`);
+    }
+    this._next();
+  }
+}
+
+function takeScan(robot, scan) {
+  const { pose } = robot.frames.lookup(scan.header.frame_id);
+  const points = [];
+  scan.ranges.forEach((range, i) => {
+    if (range === null || range < scan.range_min || range > scan.range_max) return;
+    const angle = scan.angle_min + i * scan.angle_increment;
+    points.push(place(pose, [range * Math.cos(angle), range * Math.sin(angle), 0]));
+  });
+  robot.scan = points;
+}
+
+function patch(grid, { x, y, width, height, data }) {
+  if (!grid || x + width > grid.message.info.width || y + height > grid.message.info.height) return;
+  for (let row = 0; row < height; row++)
+    for (let column = 0; column < width; column++)
+      grid.message.data[(y + row) * grid.message.info.width + x + column] = data[row * width + column];
+  grid.version += 1;
+}

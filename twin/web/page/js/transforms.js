@@ -1,0 +1,60 @@
+/** Poses in three dimensions, and a tree of frames. A pose is {p: [x, y, z] in m, q: [x, y, z, w]}. */
+
+export const IDENTITY = { p: [0, 0, 0], q: [0, 0, 0, 1] };
+
+export function rotate([x, y, z, w], [a, b, c]) {
+  const u = 2 * (y * c - z * b), v = 2 * (z * a - x * c), t = 2 * (x * b - y * a);
+  return [a + w * u + y * t - z * v, b + w * v + z * u - x * t, c + w * t + x * v - y * u];
+}
+
+function multiply([x, y, z, w], [a, b, c, d]) {
+  return [
+    w * a + x * d + y * c - z * b, w * b - x * c + y * d + z * a,
+    w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c,
+  ];
+}
+
+/** Return where a point of a pose's frame is in the frame of the pose. */
+export function place({ p, q }, point) {
+  const [x, y, z] = rotate(q, point);
+  return [p[0] + x, p[1] + y, p[2] + z];
+}
+
+export function compose(outer, inner) {
+  return { p: place(outer, inner.p), q: multiply(outer.q, inner.q) };
+}
+
+export function yawOf([x, y, z, w]) {
+  return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+}
+
+export function quaternionOf(yaw) {
+  return { x: 0, y: 0, z: Math.sin(yaw / 2), w: Math.cos(yaw / 2) };
+}
+
+/** Return a pose of a geometry_msgs/Pose or Transform. */
+export function poseOf({ position, translation = position, orientation, rotation = orientation }) {
+  return { p: [translation.x, translation.y, translation.z], q: [rotation.x, rotation.y, rotation.z, rotation.w] };
+}
+
+export class Frames {
+  constructor() {
+    this._parents = new Map(); // child -> {parent, pose}
+  }
+
+  take(message) {
+    for (const each of message.transforms)
+      this._parents.set(each.child_frame_id, { parent: each.header.frame_id, pose: poseOf(each.transform) });
+  }
+
+  /** Return {root, pose}: the frame at the tree's root and where `frame` is in it. */
+  lookup(frame) {
+    let pose = IDENTITY, root = frame;
+    for (let depth = 0; depth < 64 && this._parents.has(root); depth++) {
+      const link = this._parents.get(root);
+      pose = compose(link.pose, pose);
+      root = link.parent;
+    }
+    return { root, pose };
+  }
+}

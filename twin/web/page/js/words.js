@@ -1,0 +1,41 @@
+/** The page's sentences in its languages. */
+
+const WORDS = {
+  en: {
+    title: "Operator", connected: "Connected", disconnected: "No connection", silent: "silent for", stop: "Emergency stop", stopShort: "STOP",
+    stopped: "Stopped by", stopping: "Stopping …", release: "Release", releaseAsk: "Release the emergency stop?", releaseText: "The robot may move as soon as it is commanded. Make sure that nobody is near it.",
+    cancel: "Cancel", noStop: "This robot tells of no emergency stop", robot: "Robot", map: "Map", view3d: "3D", drive: "Drive", tasks: "Tasks", alarms: "Alarms", log: "Log", plot: "Plot", camera: "Camera",
+    pan: "Move map", goal: "Goal", pose: "Pose", waypoint: "Waypoint", fit: "Fit", follow: "Follow", zoomIn: "Zoom in", zoomOut: "Zoom out", costmap: "Costmap", scan: "Scan", plan: "Plan", zones: "Zones", layers: "Layers",
+    battery: "Battery", speed: "Speed", turn: "Turn", position: "Position", quality: "Spread of pose", waiting: "Waiting for a robot …", time: "Time", pace: "Pace",
+    hold: "Hold the stick, or the keys W A S D. Let go and it stops.", maxSpeed: "Greatest speed", noDrive: "This robot takes no velocities", joystick: "Joystick: drag, or hold arrow keys",
+    mission: "Mission", noMission: "No mission tells its state", queue: "Queue of goals", queueNote: "Kept in this page: goals go to the robot one after the other.", empty: "No goals. Choose Goal or Waypoint and click on the map.",
+    earlier: "Earlier", later: "Later", x: "x [m]", y: "y [m]", heading: "Heading [°]", add: "Add", hold_: "Hold queue", resume: "Resume queue", left: "m left",
+    active: "under way", state_waiting: "waiting", succeeded: "arrived", canceled: "cancelled", failed: "failed",
+    noAlarms: "No alarms", acknowledge: "Acknowledge", acknowledged: "Acknowledged", over: "over", connection: "The connection to the robot is lost", noLog: "Nothing said yet",
+    controlMine: "You have control", controlNone: "Nobody has control", controlOther: "has control", takeOver: "Take over", take: "Take control", giveBack: "Give back", theme: "Dark or light", language: "中文",
+    topic: "Topic", field: "Field", choose: "choose", noCamera: "No camera", mapLabel: "Map of the hall. Arrow keys move it, plus and minus zoom; goals can be typed under Tasks.", sceneLabel: "Robot in three dimensions",
+    hintGoal: "Click where to go; drag for the heading", hintPose: "Click where the robot is; drag for its heading", hintWaypoint: "Click to add a goal to the queue; drag for the heading", panels: "Panels", tools: "Tools of the map", history: "Steps",
+  },
+  zh: {
+    title: "操作台", connected: "已连接", disconnected: "连接中断", silent: "无消息", stop: "紧急停止", stopShort: "急停",
+    stopped: "急停操作者：", stopping: "正在停止 …", release: "解除", releaseAsk: "解除紧急停止？", releaseText: "解除后机器人收到指令即会移动。请确认附近无人。",
+    cancel: "取消", noStop: "该机器人未提供紧急停止", robot: "机器人", map: "地图", view3d: "三维", drive: "驾驶", tasks: "任务", alarms: "报警", log: "日志", plot: "曲线", camera: "相机",
+    pan: "移动地图", goal: "目标", pose: "位姿", waypoint: "航点", fit: "全图", follow: "跟随", zoomIn: "放大", zoomOut: "缩小", costmap: "代价地图", scan: "激光", plan: "路径", zones: "区域", layers: "图层",
+    battery: "电量", speed: "速度", turn: "转速", position: "位置", quality: "位姿散布", waiting: "等待机器人 …", time: "时间", pace: "倍速",
+    hold: "按住摇杆或 W A S D 键行驶，松开即停。", maxSpeed: "最高速度", noDrive: "该机器人不接收速度指令", joystick: "摇杆：拖动，或按住方向键",
+    mission: "使命", noMission: "没有使命状态", queue: "目标队列", queueNote: "队列保存在本页面，目标依次发送给机器人。", empty: "没有目标。选择“目标”或“航点”后点击地图。",
+    earlier: "提前", later: "推后", x: "x [米]", y: "y [米]", heading: "朝向 [°]", add: "添加", hold_: "暂停队列", resume: "继续队列", left: "米剩余",
+    active: "进行中", state_waiting: "等待", succeeded: "已到达", canceled: "已取消", failed: "失败",
+    noAlarms: "没有报警", acknowledge: "确认", acknowledged: "已确认", over: "已结束", connection: "与机器人的连接中断", noLog: "暂无日志",
+    controlMine: "您正在控制", controlNone: "无人控制", controlOther: "正在控制", takeOver: "接管", take: "取得控制", giveBack: "交还", theme: "深色或浅色", language: "English",
+    topic: "话题", field: "字段", choose: "选择", noCamera: "没有相机", mapLabel: "厂房地图。方向键移动，加减号缩放；也可在任务面板输入目标。", sceneLabel: "机器人三维视图",
+    hintGoal: "点击目的地，拖动设定朝向", hintPose: "点击机器人所在位置，拖动设定朝向", hintWaypoint: "点击添加到队列，拖动设定朝向", panels: "面板", tools: "地图工具", history: "步骤",
+  },
+};
+
+export const LANGUAGES = Object.keys(WORDS);
+
+/** Return what gives the words of a language. */
+export function wordsOf(language) {
+  return (key) => WORDS[language][key] ?? key;
+}

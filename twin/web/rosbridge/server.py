@@ -1,0 +1,381 @@
+"""The websocket server: a thread that only moves bytes; what they mean is decided in the bridge's thread."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import socket
+import ssl
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from twin.errors import BridgeError
+from twin.web.rosbridge.access import ROLES, STOPS, Role, Token, find_token, matches
+from twin.web.rosbridge.bridge import Bridge, Limits
+from twin.web.rosbridge.frames import from_json, to_json
+from twin.web.rosbridge.outbox import Outbox
+from twin.web.rosbridge.pages import Page, page_of, policy_of
+from twin.web.rosbridge.session import Session
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+_AUTH_S = 5.0
+"""How long a client may take to tell its token [s]."""
+_WRONG_TOKENS = 10
+_LOCKED_S = 60.0
+_MOST_PENDING = 200
+"""Messages of one client that wait for the bridge."""
+_LOCAL = ("localhost", "127.0.0.1", "::1")
+
+
+@dataclass(frozen=True)
+class ServerConfig:
+    """Where clients come in, and who may."""
+
+    address: str = "127.0.0.1"
+    port: int = 9090
+    """0: any that is free."""
+    tokens: tuple[Token, ...] = ()
+    """Empty: everybody is an engineer; only on loopback."""
+    origins: tuple[str, ...] = ()
+    """Of pages elsewhere that may connect, such as https://hall.example; 'null' is a page from a file."""
+    hosts: tuple[str, ...] = ()
+    """Names by which the server is called, beside addresses and this computer's name."""
+    certificate: Path | None = None
+    """PEM; with it the server speaks TLS."""
+    key: Path | None = None
+    folders: Mapping[str, Path] = field(default_factory=dict)
+    """Files for browsers, see `page_of`."""
+
+    def __post_init__(self) -> None:
+        """Refuse to be open to all."""
+        if not self.tokens and not _is_loopback(self.address):
+            raise BridgeError(
+                f"--address {self.address} is not this computer alone; with --token FILE others may come in"
+            )
+
+
+def _is_loopback(address: str) -> bool:
+    try:
+        return address == "localhost" or ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return False
+
+
+class Connection:
+    """A client as both threads see it."""
+
+    def __init__(self, name: str, role: Role | None, limits: Limits, loop: asyncio.AbstractEventLoop) -> None:
+        self.name = name
+        self.role = role
+        """None until it has told its token."""
+        self.outbox = Outbox(limits.waiting_bytes)
+        self.session: Session | None = None
+        self.pending = 0
+        self.filled = asyncio.Event()
+        self._loop = loop
+        self._rate = limits.messages_per_s
+        self._tokens = self._burst = 2.0 * limits.messages_per_s
+        self._last_s = self._told_s = 0.0
+
+    def send(self, frame: str | bytes, topic: str | None) -> None:
+        """Let a frame be sent; called in any thread."""
+        self.outbox.put(frame, topic)
+        if not self.filled.is_set():
+            try:
+                self._loop.call_soon_threadsafe(self.filled.set)
+            except RuntimeError:
+                return  # the server has ended
+
+    def refuse(self, why: str) -> None:
+        """Tell a client, not more than once a second, that a message of it was dropped."""
+        if time.monotonic() - self._told_s > 1.0:
+            self._told_s = time.monotonic()
+            self.send(to_json({"op": "status", "level": "error", "msg": why}), None)
+
+    def may_send(self, now_s: float) -> bool:
+        """Take note of a message; return whether it is within the rate."""
+        self._tokens = min(self._burst, self._tokens + (now_s - self._last_s) * self._rate)
+        self._last_s = now_s
+        self._tokens -= 1.0
+        if self._tokens < 0.0:
+            self._tokens = 0.0
+            return False
+        return True
+
+
+@dataclass
+class _Event:
+    connection: Connection
+    message: dict[str, Any] | None
+    """None: it has gone."""
+
+
+class Server:
+    """Listens from `start` to `close`; `work` hands to a bridge what has come."""
+
+    def __init__(self, config: ServerConfig, limits: Limits, wake: Callable[[], None]) -> None:
+        self.connections: set[Connection] = set()
+        self.address = ""
+        """Such as ws://127.0.0.1:9090."""
+        self._config, self._limits, self._wake = config, limits, wake
+        self._stops: deque[_Event] = deque()
+        self._events: deque[_Event] = deque()
+        self._wrong: dict[str, tuple[int, float]] = {}
+        self._ready = threading.Event()
+        self._fault: Exception | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._end: asyncio.Event | None = None
+        self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
+
+    def start(self) -> None:
+        """Begin to listen.
+
+        Raises:
+            BridgeError: the port is taken, the address is not this computer's, or a file of TLS is no good.
+        """
+        self._thread.start()
+        self._ready.wait()
+        if self._fault is not None:
+            where = f"{self._config.address}:{self._config.port}"
+            raise BridgeError(f"rosbridge cannot listen on {where}: {self._fault}")
+
+    def close(self) -> None:
+        """Disconnect everybody. Harmless when repeated."""
+        if self._loop is not None and self._end is not None and self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._end.set)
+        self._thread.join(10.0)
+
+    def work(self, bridge: Bridge) -> None:
+        """Do what clients want, stops first; called in the bridge's thread."""
+        for _ in range(len(self._events) + len(self._stops)):
+            event = self._stops.popleft() if self._stops else self._events.popleft() if self._events else None
+            if event is None:
+                return
+            self._do(bridge, event)
+
+    def _do(self, bridge: Bridge, event: _Event) -> None:
+        connection = event.connection
+        if connection.session is None:
+            assert connection.role is not None
+            connection.session = bridge.join(connection.name, connection.role, connection.send)
+        if event.message is None:
+            connection.session.close()
+            return
+        connection.pending -= 1
+        connection.session.handle(event.message)
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except Exception as fault:
+            self._fault = fault
+        finally:
+            self._ready.set()
+
+    async def _serve(self) -> None:
+        from websockets.asyncio.server import serve
+
+        config, secure = self._config, None
+        if config.certificate is not None:
+            secure = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            secure.load_cert_chain(config.certificate, config.key)
+        self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
+        async with serve(
+            self._on_client,
+            config.address,
+            config.port,
+            process_request=self._on_request,
+            max_size=self._limits.message_bytes,
+            max_queue=16,
+            compression=None,
+            ssl=secure,
+            server_header=None,
+        ) as listening:
+            host, port = next(iter(listening.sockets)).getsockname()[:2]
+            shown = f"[{host}]" if ":" in host else host
+            self.address = f"{'ws' if secure is None else 'wss'}://{shown}:{port}"
+            self._ready.set()
+            await self._end.wait()
+
+    def _on_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        host = request.headers.get("Host", "")
+        if not self._is_own_name(_hostname(f"//{host}")):
+            return _response(Page(403, "text/plain", b"this server has another name\n"))
+        if request.headers.get("Upgrade", "").lower() != "websocket":
+            return _response(page_of(self._config.folders, urlsplit(request.path).path))
+        origin = request.headers.get("Origin")
+        if origin is not None and not self._may_come_from(origin, host):
+            return _response(Page(403, "text/plain", b"pages of this origin may not connect\n"))
+        if len(self.connections) >= self._limits.clients:
+            return _response(Page(503, "text/plain", b"too many clients\n"))
+        given = _given_token(request)
+        if self._config.tokens and given is not None:
+            token = self._checked(_peer(connection), given)
+            if token is None:
+                return _response(Page(401, "text/plain", b"wrong token\n"))
+            connection.token = token  # type: ignore[attr-defined]
+        return None
+
+    def _is_own_name(self, name: str) -> bool:
+        """Whether a Host is us: a name of somebody else's that leads here is DNS rebinding."""
+        if name in (*_LOCAL, self._config.address, socket.gethostname().lower(), *self._config.hosts):
+            return True
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return not _is_loopback(self._config.address)
+
+    def _may_come_from(self, origin: str, host: str) -> bool:
+        if origin in self._config.origins:
+            return True
+        parts = urlsplit(origin)
+        is_local = _is_loopback(self._config.address) and _hostname(origin) in _LOCAL
+        return parts.scheme in ("http", "https") and (is_local or parts.netloc.lower() == host.lower())
+
+    def _checked(self, peer: str, secret: str) -> Token | None:
+        """Return the token that a client has told; after ten wrong ones, for a while, none."""
+        count, since_s = self._wrong.get(peer, (0, 0.0))
+        now_s = time.monotonic()
+        if count >= _WRONG_TOKENS and now_s - since_s < _LOCKED_S:
+            return None
+        token = find_token(self._config.tokens, secret)
+        if token is not None:
+            self._wrong.pop(peer, None)
+        else:
+            if len(self._wrong) > 10_000:
+                self._wrong.clear()
+            self._wrong[peer] = (count + 1 if now_s - since_s < _LOCKED_S else 1, now_s)
+        return token
+
+    async def _on_client(self, websocket: ServerConnection) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        token: Token | None = getattr(websocket, "token", None)
+        role = token.role if token else None if self._config.tokens else ROLES["engineer"]
+        peer = _peer(websocket)
+        assert self._loop is not None
+        connection = Connection(token.name if token else peer, role, self._limits, self._loop)
+        self.connections.add(connection)
+        writer = asyncio.create_task(self._write(websocket, connection))
+        try:
+            if connection.role is None:
+                async with asyncio.timeout(_AUTH_S):
+                    await self._authenticate(websocket, connection, peer)
+            async for text in websocket:
+                self._take(connection, text)
+        except (ConnectionClosed, TimeoutError):
+            pass
+        finally:
+            self.connections.discard(connection)
+            writer.cancel()
+            if connection.role is not None:
+                # With the stops: who steered and is gone is stopped before others are heard.
+                self._stops.append(_Event(connection, None))
+                self._wake()
+
+    async def _authenticate(self, websocket: ServerConnection, connection: Connection, peer: str) -> None:
+        """Wait for the token; raises TimeoutError, ConnectionClosed."""
+        while connection.role is None:
+            try:
+                message = from_json(await websocket.recv())
+            except BridgeError:
+                message = {}
+            secret = message.get("token") if message.get("op") == "auth" else None
+            token = self._checked(peer, secret) if isinstance(secret, str) else None
+            if token is None:
+                await websocket.close(1008, "the first message is auth, with a token that is known")
+                return
+            connection.role, connection.name = token.role, token.name
+
+    def _take(self, connection: Connection, text: str | bytes) -> None:
+        """Queue what a client says; a stop overtakes all else, and is never too much."""
+        try:
+            message = from_json(text)
+        except BridgeError as error:
+            connection.may_send(time.monotonic())
+            connection.refuse(str(error))
+            return
+        is_stop = _is_stop(message)
+        if not is_stop and not connection.may_send(time.monotonic()):
+            connection.refuse(
+                f"more than {self._limits.messages_per_s:g} messages a second: some were dropped"
+            )
+            return
+        if not is_stop and connection.pending >= _MOST_PENDING:
+            connection.refuse("the bridge is busy: some messages were dropped")
+            return
+        connection.pending += 1
+        (self._stops if is_stop else self._events).append(_Event(connection, message))
+        self._wake()
+
+    async def _write(self, websocket: ServerConnection, connection: Connection) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        outbox = connection.outbox
+        try:
+            while True:
+                await connection.filled.wait()
+                connection.filled.clear()
+                while (frame := outbox.take()) is not None:
+                    async with asyncio.timeout(self._limits.stalled_s):
+                        await websocket.send(frame)
+                    if outbox.is_overfull:
+                        raise TimeoutError
+        except TimeoutError:
+            websocket.transport.abort()  # it reads nothing: a closing handshake would wait for it
+        except ConnectionClosed:
+            return
+
+
+def _is_stop(message: dict[str, Any]) -> bool:
+    name = message.get({"publish": "topic", "call_service": "service"}.get(str(message.get("op")), ""))
+    return isinstance(name, str) and matches(f"/{name.lstrip('/')}", STOPS)
+
+
+def _given_token(request: Request) -> str | None:
+    header = request.headers.get("Authorization", "")
+    if header.startswith("Bearer "):
+        return header.removeprefix("Bearer ").strip()
+    found = parse_qs(urlsplit(request.path).query).get("token")
+    return found[0] if found else None
+
+
+def _hostname(url: str) -> str:
+    try:
+        return (urlsplit(url).hostname or "").lower()
+    except ValueError:
+        return ""
+
+
+def _peer(connection: ServerConnection) -> str:
+    address = connection.remote_address
+    return str(address[0]) if address else "somebody"
+
+
+def _response(page: Page) -> Response:
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
+
+    reasons = {200: "OK", 401: "Unauthorized", 403: "Forbidden", 404: "Not Found", 503: "Service Unavailable"}
+    headers = Headers(
+        {
+            "Content-Type": page.content_type,
+            "Content-Length": str(len(page.body)),
+            "Content-Security-Policy": policy_of(page),
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            "Cache-Control": "no-cache",
+            "Connection": "close",
+        }
+    )
+    return Response(page.status, reasons[page.status], headers, page.body)
