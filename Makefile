@@ -51,7 +51,7 @@ mutate: $(VENV)/.ready  ## 200 small wrong changes, each of which tests should n
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,mutate]'
 	$(BIN)/python -m tests.mutation.mutate $(ARGS)
 
-oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy, checks against rtamt
+oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fidelity.md, the wire against two other implementations, messages against real rclpy, checks against rtamt, rosbridge against roslibpy and roslib
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,oracle]'
 	$(BIN)/python -m pytest tests/convert/test_pinocchio.py tests/models/test_kinematics.py
 	$(BIN)/python -m tests.oracles.example_robots
@@ -64,6 +64,14 @@ oracle: $(VENV)/.ready  ## conversions against pinocchio, the table in docs/fide
 	$(PYTHON) -m venv build/stl_oracle
 	build/stl_oracle/bin/python -m pip install --quiet --disable-pip-version-check rtamt==0.4.10
 	TWIN_STL_ORACLE=build/stl_oracle/bin/python $(BIN)/python -m pytest tests/scenario/temporal/test_rtamt.py
+	mkdir -p build/roslib_oracle/1 build/roslib_oracle/2
+	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --no-binary :all: --dest build/roslib_oracle roslibpy==2.1.0
+	tar -xzf build/roslib_oracle/roslibpy-2.1.0.tar.gz -C build/roslib_oracle
+	$(PYTHON) -m venv build/roslib_oracle/roslibpy-2.1.0/venv
+	build/roslib_oracle/roslibpy-2.1.0/venv/bin/python -m pip install --quiet --disable-pip-version-check roslibpy==2.1.0 pytest pytest-asyncio
+	npm install --silent --prefix build/roslib_oracle/1 roslib@1.4.1
+	npm install --silent --prefix build/roslib_oracle/2 roslib@2.1.0
+	TWIN_ROSLIBPY=$(CURDIR)/build/roslib_oracle/roslibpy-2.1.0 TWIN_ROSLIB1=$(CURDIR)/build/roslib_oracle/1 TWIN_ROSLIB2=$(CURDIR)/build/roslib_oracle/2 $(BIN)/python -m pytest tests/web/test_unchanged_clients.py
 
 scenarios: $(VENV)/.ready  ## every scenario; the exit code is the verdict
 	$(BIN)/twin test scenarios
