@@ -9,6 +9,7 @@ const LEVELS = { 10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal" }
 const GOAL = { name: "navigate_to_pose", type: "nav2_msgs/action/NavigateToPose" };
 const SUCCEEDED = 4, CANCELED = 5;
 const STOP_AGAIN_MS = 200;
+const STOP_UNHEARD_MS = 10_000;
 
 /** A robot: everything below one namespace. */
 class Robot {
@@ -217,12 +218,12 @@ export class Station extends EventTarget {
     this.alarm(`guard ${robot.space}`, "error", `${robot.name}: emergency stop (${by})`, Boolean(by));
   }
 
-  /** Press the emergency stop of all robots; said again until each tells that it is stopped. */
+  /** Press the emergency stop of all robots; said again until each tells that it is stopped, not for ever to one without a guard. */
   stop() {
     for (const robot of this.robots.values()) {
       robot.stopAsked = performance.now();
       const press = () => {
-        if (!robot.stopAsked) return;
+        if (!robot.stopAsked || (!robot.guard && performance.now() - robot.stopAsked > STOP_UNHEARD_MS)) return;
         this.ros.publish(`${robot.space}/guard/stop`, "std_msgs/msg/Header", { frame_id: this.name });
         setTimeout(press, STOP_AGAIN_MS);
       };
