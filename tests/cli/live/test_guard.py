@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import monotonic
+
 import pytest
 
 from tests.cli.conftest import Invoke
@@ -40,6 +42,9 @@ def use(robot: live.LiveBus, endpoint: str, invoke: Invoke, monkeypatch: pytest.
         )
         assert robot.spin(lambda: bool(told), LONG_S)
         wait = ("--timeout", LONG_S)
+        until_s = monotonic() + LONG_S  # its first words are from before it has found the robot
+        while "no robot" in invoke("guard", "status", *wait)[1] and monotonic() < until_s:
+            pass
         assert invoke("guard", "status", *wait) == (0, "stopped by start\n", "")
         assert invoke("guard", "release", *wait) == (0, "released\n", "")
         assert invoke("guard", "status", *wait) == (0, "nobody commands\n", "")
