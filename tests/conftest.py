@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,6 +28,16 @@ if "TWIN_CACHE" not in os.environ:  # the processes that tests start, and pytest
 
 settings.register_profile("twin", deadline=None)  # a busy machine is no fault of an example
 settings.load_profile("twin")
+
+
+@pytest.fixture(autouse=True)
+def _own_log() -> Iterator[None]:
+    """Give the log back as it was: commands that run in this process show it from then on."""
+    log = logging.getLogger("twin")
+    level, handlers, propagate = log.level, log.handlers[:], log.propagate
+    yield
+    log.setLevel(level)
+    log.handlers[:], log.propagate = handlers, propagate
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import cbor2
@@ -9,9 +10,11 @@ from tests.web.conftest import World
 from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions import ActionServer
 from twin.bridge.cdr.codec import codec
-from twin.bridge.msgs import String, Twist, TwistStamped, Vector3, new
+from twin.bridge.msgs import Header, PoseStamped, PoseWithCovarianceStamped, String, Twist, TwistStamped, Vector3, new
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import AddTwoInts, SetBool, Trigger
+from twin.errors import BridgeError
+from twin.web.rosbridge.access import ROLES, read_rules
 
 TWIST = "geometry_msgs/msg/Twist"
 
@@ -181,6 +184,11 @@ def test_a_client_offers_a_service(world: World) -> None:
         "another client"
         in errors(client.tell("advertise_service", service="/lamp", type="std_srvs/SetBool"))[0]
     )
+    none = world.bus.create_node("none").create_client(SetBool, "/lamp").call_async(SetBool.Request(True))
+    world.spin()
+    (call,) = server.heard()
+    server.tell("service_response", service="/lamp", id=call["id"], values="broken", result=False)
+    assert none.error is not None
     later = world.bus.create_node("later").create_client(SetBool, "/lamp").call_async(SetBool.Request(True))
     world.spin()
     server.session.close()
@@ -317,9 +325,104 @@ def test_one_steers_at_a_time(world: World) -> None:
     assert errors(one.tell("publish", **move))
     world.spin(3.5)
     assert one.tell("publish", **move) == []  # nobody renewed it
-    ops = [(line["op"], line["target"]) for line in world.lines]
+    ops = [(line["op"], line["target"]) for line in world.lines if "refused" not in (line["values"] or {})]
     assert ops.count(("publish", "/cmd_vel")) == 3
     assert ("call_service", "/guard/stop") in ops
+
+
+@pytest.mark.parametrize(
+    "service", ["/guard/release", "/fleet/add_task", "/go/_action/cancel_goal", "/turtle1/teleport_absolute"]
+)
+def test_services_that_steer_need_control(world: World, service: str) -> None:
+    called = []
+    node = world.bus.create_node("robot")
+    node.create_service(Trigger, service, lambda request: called.append(1) or Trigger.Response(True, ""))
+    one, other = world.client("operator"), world.client("operator")
+    assert one.tell("call_service", service=service)[0]["result"]
+    told = other.tell("call_service", service=service)
+    assert "has control" in errors(told)[0]
+    assert [each["result"] for each in told if each["op"] == "service_response"] == [False]
+    world.spin(3.5)
+    assert other.tell("call_service", service=service)[0]["result"]
+    assert called == [1, 1]
+
+
+def test_a_release_by_topic_needs_control(world: World) -> None:
+    heard = world.listen(Header, "/guard/release")
+    one, other = world.client("operator"), world.client("operator")
+    assert one.tell("publish", topic="/guard/release", msg={}) == []
+    assert "has control" in errors(other.tell("publish", topic="/guard/release", msg={}))[0]
+    assert len(heard) == 1
+
+
+@pytest.mark.parametrize("topic", ["/goal_pose", "/robot/goal_pose", "/initialpose"])
+def test_nobody_is_sent_to_a_place_that_is_no_number(world: World, topic: str) -> None:
+    kind = PoseWithCovarianceStamped if topic == "/initialpose" else PoseStamped
+    heard = world.listen(kind, topic)
+    pose: dict[str, Any] = {"position": {"x": None}}
+    pose = {"pose": pose} if kind is PoseWithCovarianceStamped else pose
+    client = world.client("operator")
+    told = client.tell("publish", topic=topic, msg={"header": {"frame_id": "map"}, "pose": pose})
+    assert errors(told)
+    assert heard == []
+
+
+def test_what_was_refused_is_in_the_audit_once_a_second(world: World) -> None:
+    viewer = world.client("viewer")
+    for _ in range(5):
+        assert errors(viewer.tell("publish", topic="/cmd_vel", msg={}))
+    assert errors(viewer.tell("call_service", service="/guard/release"))
+    world.spin(1.1)
+    assert errors(viewer.tell("publish", topic="/cmd_vel", msg={}))
+    assert errors(viewer.tell("dance"))  # no command
+    refused = [(line["op"], line["target"], "viewer" in line["values"]["refused"]) for line in world.lines]
+    publish = ("publish", "/cmd_vel", True)
+    assert refused == [publish, ("call_service", "/guard/release", True), publish]
+
+
+def test_requests_that_a_client_never_answers_are_bounded(world: World) -> None:
+    server = world.client()
+    server.tell("advertise_service", service="/lamp", type="std_srvs/SetBool")
+    asking = world.bus.create_node("asker").create_client(SetBool, "/lamp")
+    asked = [asking.call_async(SetBool.Request(True)) for _ in range(1001)]
+    world.spin()
+    assert [future.error is not None for future in asked] == [True] + [False] * 1000
+
+
+@pytest.mark.parametrize(
+    ("service", "is_allowed"),
+    [
+        ("/turtle1/teleport_absolute", True),
+        ("/turtle1/set_parameters", False),
+        ("/turtlebot3/controller_server/set_parameters_atomically", False),
+        ("/turtlebot3/change_map", False),
+        ("/slam_toolbox/clear_queue", True),
+        ("/clear_all/set_parameters", False),
+    ],
+)
+def test_an_operator_calls_what_operates(service: str, is_allowed: bool) -> None:
+    assert ROLES["operator"].allows("service", service) is is_allowed
+    assert not ROLES["viewer"].allows("service", service)
+
+
+def test_rules_of_a_file(world: World, tmp_path: Path) -> None:
+    file = tmp_path / "rules.yaml"
+    file.write_text("viewer: {subscribe: ['/map'], call: ['/rosapi/topics']}\noperator: {offer: true}\n")
+    roles = read_rules(file)
+    assert roles["engineer"] == ROLES["engineer"]
+    assert roles["operator"].may_offer
+    client = world.client()
+    client.session.role = roles["viewer"]
+    assert client.tell("subscribe", topic="/map", type="std_msgs/String") == []
+    (told,) = errors(client.tell("subscribe", topic="/camera", type="std_msgs/String"))
+    assert "the heard topic /camera is not for the role viewer" in told
+    assert errors(client.tell("call_service", service="/rosapi/nodes"))
+    assert client.tell("call_service", service="/rosapi/topics")[0]["result"]
+    file.write_text("viewer: {hear: ['/map']}\nking: {}\noperator: {call: [stop]}\n")
+    with pytest.raises(BridgeError) as fault:
+        read_rules(file)
+    for words in ("rules.yaml:1", "hear", "rules.yaml:2", "king", "rules.yaml:3"):
+        assert words in str(fault.value)
 
 
 @pytest.mark.parametrize("role", ["viewer", "operator"])

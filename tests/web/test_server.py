@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import socket
@@ -30,14 +31,21 @@ from twin.web.rosbridge.access import read_tokens
 from twin.web.rosbridge.bridge import BridgeConfig, Limits
 from twin.web.rosbridge.outbox import Outbox
 from twin.web.rosbridge.process import Rosbridge
-from twin.web.rosbridge.server import ServerConfig
+from twin.web.rosbridge.server import Server, ServerConfig
 
+HANDSHAKE = (
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
 SECRETS = "viewer-0123456789", "operator-0123456789"
 
 
 @contextmanager
 def serving(
-    config: ServerConfig, limits: Limits | None = None, nodes: Callable[[Bus], Any] = lambda bus: None
+    config: ServerConfig,
+    limits: Limits | None = None,
+    nodes: Callable[[Bus], Any] = lambda bus: None,
+    audit: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Rosbridge]:
     """A bridge on a bus of its own, run by a thread."""
     made: list[Rosbridge] = []
@@ -47,7 +55,7 @@ def serving(
         clock = Clock()
         with Bus.open(clock) as bus:
             process = LiveBus(bus, clock, use_sim_time=False)
-            rosbridge = Rosbridge(process, config, BridgeConfig(limits or Limits()))
+            rosbridge = Rosbridge(process, config, BridgeConfig(limits or Limits(), audit=audit))
             nodes(bus)
             made.append(rosbridge)
             ready.set()
@@ -96,7 +104,8 @@ def test_a_token_lets_in(tokens: ServerConfig, how: str) -> None:
 
 
 def test_ten_wrong_tokens_lock_an_address_out(tokens: ServerConfig) -> None:
-    with serving(tokens) as server:
+    audited: list[dict[str, Any]] = []
+    with serving(tokens, audit=lambda line: audited.append(json.loads(line))) as server:
         address = server.server.address
         with connect(address) as client:
             client.send(json.dumps({"op": "call_service", "service": "/rosapi/topics"}))
@@ -109,6 +118,10 @@ def test_ten_wrong_tokens_lock_an_address_out(tokens: ServerConfig) -> None:
                 connect(f"{address}/?token=wrong")
         with pytest.raises(InvalidStatus, match="401"):
             connect(f"{address}/?token={SECRETS[1]}")
+        with connect(f"{address}/?token={SECRETS[1]}", source_address=("127.0.0.2", 0)) as client:
+            assert topics(client)["result"]  # another address
+    wrong = {"op": "connect", "name": "127.0.0.1", "values": {"refused": "wrong token"}}
+    assert [{key: line[key] for key in wrong} for line in audited] == [wrong] * 10
 
 
 def test_more_than_this_computer_needs_a_token() -> None:
@@ -192,6 +205,25 @@ def test_too_large_too_often_too_many() -> None:
         with connect(address) as client:
             client.send("no json")
             assert "no JSON" in json.loads(client.recv(timeout=60.0))["msg"]
+            assert topics(client)["result"]
+
+
+def test_a_thousand_connections_leave_room_for_nobody_else_and_nothing_behind() -> None:
+    with serving(ServerConfig(port=0)) as server:
+        host, port = server.server.address.removeprefix("ws://").split(":")
+        with contextlib.ExitStack() as stack:
+            clients = [stack.enter_context(connect(server.server.address)) for _ in range(50)]
+            sockets = [socket.create_connection((host, int(port)), timeout=60.0) for _ in range(950)]
+            for each in sockets:
+                stack.enter_context(each)
+            refused = 0
+            for each in sockets[:100]:
+                each.sendall(HANDSHAKE)
+                refused += b" 503 " in each.recv(1000)
+            assert refused == 100
+            assert all(topics(client)["result"] for client in clients)
+        wait_for(lambda: not server.server.connections)
+        with connect(server.server.address) as client:
             assert topics(client)["result"]
 
 
@@ -313,3 +345,12 @@ def test_a_port_that_is_taken_is_a_sentence() -> None:
         clock = Clock()
         with Bus.open(clock) as bus, pytest.raises(BridgeError, match="cannot listen"):
             Rosbridge(LiveBus(bus, clock, use_sim_time=False), ServerConfig(port=port), BridgeConfig())
+
+
+@pytest.mark.parametrize("text", [None, "no certificate"])
+def test_files_of_tls_that_are_none_are_a_sentence(tmp_path: Path, text: str | None) -> None:
+    file = tmp_path / "certificate.pem"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(BridgeError, match=r"certificate\.pem: no certificate in PEM"):
+        Server(ServerConfig(port=0, certificate=file), Limits(), lambda: None).start()

@@ -34,7 +34,7 @@ _QOS = QoS(depth=10)
 _FOREVER_S = 1e8  # like rmw_zenoh, a request has no time-out of its own
 
 Respond = Callable[[Any], None]
-"""Sends the response; may be called in a later spin."""
+"""Sends the response, or None: then who asked learns that there will be none. May be called in a later spin."""
 
 
 def codecs(srv_type: ServiceType) -> tuple[Codec[Any], Codec[Any]]:
@@ -98,7 +98,7 @@ class Service(Endpoint):
             return
 
         def respond(response: Any) -> None:
-            if type(response) is not self._responses.cls:
+            if response is not None and type(response) is not self._responses.cls:
                 what = type(response).__name__
                 raise TypeError(f"{self.name} answers with {self._responses.msgtype}, not {what}")
             if data not in self._open:
@@ -106,6 +106,9 @@ class Service(Endpoint):
                     return  # destroyed meanwhile: the client knows
                 raise BridgeError(f"a request to {self.name} was answered twice; valid is once")
             self._open.discard(data)
+            if response is None:
+                data.drop()
+                return
             now_ns, link = self.node.now_ns, self.node.bus.link
             reply = partial(data.reply, self._responses.encode(response), now_ns)
             if link is None or not external:

@@ -25,6 +25,12 @@ def rosbridge(
             metavar="FILE", exists=True, dir_okay=False, help="Who may come in: lines of TOKEN ROLE [NAME]."
         ),
     ] = None,
+    rules: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", exists=True, dir_okay=False, help="What each role may do, as YAML, see docs/web.md."
+        ),
+    ] = None,
     origin: Annotated[
         list[str] | None,
         typer.Option(metavar="URL", help="Pages of this server may connect; null: pages from files."),
@@ -61,17 +67,21 @@ def rosbridge(
     """Let web clients take part in a graph: rosbridge v2, and the operator's page, on one port."""
     from twin.bridge.programs.console_log import show_log
     from twin.bridge.wire.interrupts import noted_signals
-    from twin.web.rosbridge.access import read_tokens
+    from twin.web.rosbridge.access import ROLES, read_rules, read_tokens
     from twin.web.rosbridge.bridge import BridgeConfig, Limits
     from twin.web.rosbridge.control import ControlConfig
     from twin.web.rosbridge.process import PAGE, Rosbridge, audit_file
     from twin.web.rosbridge.server import ServerConfig
 
+    if certificate is None and key is not None:
+        raise typer.BadParameter("--key is of a --certificate, which is not given")
     show_log()
+    roles = read_rules(rules) if rules else ROLES
     config = ServerConfig(
         address=address,
         port=port,
-        tokens=read_tokens(token) if token else (),
+        open_to=roles["engineer"],
+        tokens=read_tokens(token, roles) if token else (),
         origins=tuple(origin or ()),
         hosts=tuple(host or ()),
         certificate=certificate,

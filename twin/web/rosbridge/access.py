@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import hmac
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Annotated, Literal
 
+from pydantic import StringConstraints
+
+from twin import strict_yaml
 from twin.errors import BridgeError
+from twin.strict_yaml import StrictModel
+
+Kind = Literal["topic", "heard topic", "service", "action"]
+Pattern = Annotated[str, StringConstraints(pattern=r"^[/*]")]
+"""Of absolute names, so it begins with / or *."""
 
 EVERYTHING = ("*",)
 _READING = (
@@ -19,7 +28,8 @@ _READING = (
 _CHANGING = ("/rosapi/set_param", "/rosapi/delete_param")
 _OPERATING = (
     "*/guard/stop", "*/guard/release", "*/clear_*", "*/reinitialize_global_localization",
-    "*/set_initial_pose", "*/toggle", "/clear", "/reset", "/spawn", "/kill", "/turtle*/*",
+    "*/set_initial_pose", "*/toggle", "/clear", "/reset", "/spawn", "/kill",
+    "*/teleport_absolute", "*/teleport_relative", "*/set_pen",
     "*/add_task", "*/cancel_task", "*/pause", "*/resume", "*/_action/cancel_goal", "*/acknowledge*",
 )  # fmt: skip
 _TALKING = (
@@ -31,8 +41,20 @@ STOPS = ("*/guard/stop", "*/emergency_stop", "*/e_stop", "*/estop")
 """Names by which a robot is stopped: such a command overtakes all others and needs no control."""
 STEERING_TYPES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 """Velocities: who sends them steers, and stops if it falls silent."""
-STEERING_TOPICS = ("*/initialpose", "*/goal_pose", "*/joy", "*/waypoints")
+STEERING_TOPICS = (
+    "*/initialpose", "*/goal_pose", "*/joy", "*/waypoints", "*/guard/release", "*/keepout*", "*/speed_limit",
+)  # fmt: skip
 """Other topics by which a robot is steered."""
+STEERING_SERVICES = (
+    "*/guard/release", "*/reinitialize_global_localization", "*/set_initial_pose", "*/toggle",
+    "*/teleport_absolute", "*/teleport_relative", "*/add_task", "*/cancel_task", "*/pause", "*/resume",
+    "*/_action/send_goal", "*/_action/cancel_goal",
+)  # fmt: skip
+"""Services by which a robot is steered; those of other programs need a role, and no control."""
+
+
+class RefusedError(BridgeError):
+    """Who asked may not do that, or not now: a refusal that the audit tells of."""
 
 
 def matches(name: str, patterns: Sequence[str]) -> bool:
@@ -42,7 +64,7 @@ def matches(name: str, patterns: Sequence[str]) -> bool:
 
 @dataclass(frozen=True)
 class Role:
-    """What a client may do, as patterns of absolute names. All may subscribe."""
+    """What a client may do, as patterns of absolute names."""
 
     name: str
     topics: tuple[str, ...] = ()
@@ -52,23 +74,30 @@ class Role:
     actions: tuple[str, ...] = ()
     """To which it may send goals."""
     not_services: tuple[str, ...] = ()
+    heard: tuple[str, ...] = EVERYTHING
+    """Topics that it may subscribe to."""
     may_offer: bool = False
     """Whether it may offer services and actions of its own."""
 
-    def allows(self, kind: str, name: str) -> bool:
-        """Return whether it may publish a topic, call a service or send goals to an action of this name."""
-        allowed = {"topic": self.topics, "service": self.services, "action": self.actions}[kind]
+    def allows(self, kind: Kind, name: str) -> bool:
+        """Return whether it may publish a topic, hear one, call a service or send an action of this name goals."""
+        allowed = {
+            "topic": self.topics,
+            "heard topic": self.heard,
+            "service": self.services,
+            "action": self.actions,
+        }[kind]
         return matches(name, allowed) and not (kind == "service" and matches(name, self.not_services))
 
-    def check(self, kind: str, name: str) -> None:
+    def check(self, kind: Kind, name: str) -> None:
         """Refuse what the role may not do.
 
         Raises:
-            BridgeError: says what, and who may.
+            RefusedError: says what, and who may unless rules have changed that.
         """
         if not self.allows(kind, name):
             may = " or ".join(role.name for role in ROLES.values() if role.allows(kind, name))
-            raise BridgeError(f"the {kind} {name} is not for the role {self.name}; it needs {may}")
+            raise RefusedError(f"the {kind} {name} is not for the role {self.name}; it needs {may}")
 
 
 ROLES = {
@@ -80,12 +109,52 @@ ROLES = {
             topics=_TALKING,
             services=(*_READING, *_OPERATING, *STOPS),
             actions=EVERYTHING,
-            not_services=_CHANGING,
+            not_services=(*_CHANGING, "*/set_parameters", "*/set_parameters_atomically"),
         ),
         Role("engineer", EVERYTHING, EVERYTHING, EVERYTHING, may_offer=True),
     )
 }
 """What clients can be, the least first."""
+
+
+class RoleRules(StrictModel):
+    """What one role may do, instead of what it may by itself: patterns of absolute names, `*` is anything."""
+
+    publish: tuple[Pattern, ...] | None = None
+    """Topics that it may publish."""
+    subscribe: tuple[Pattern, ...] | None = None
+    """Topics that it may hear."""
+    call: tuple[Pattern, ...] | None = None
+    """Services that it may call; then these alone decide."""
+    goals: tuple[Pattern, ...] | None = None
+    """Actions to which it may send goals."""
+    offer: bool | None = None
+    """Whether it may offer services and actions of its own."""
+
+    def of(self, role: Role) -> Role:
+        """Return a role under these rules."""
+        given = {"topics": self.publish, "heard": self.subscribe, "actions": self.goals, "may_offer": self.offer}
+        if self.call is not None:
+            given |= {"services": self.call, "not_services": ()}
+        return replace(role, **{name: value for name, value in given.items() if value is not None})
+
+
+class Rules(StrictModel):
+    """Roles that are not as they are by themselves."""
+
+    viewer: RoleRules = RoleRules()
+    operator: RoleRules = RoleRules()
+    engineer: RoleRules = RoleRules()
+
+
+def read_rules(file: Path) -> dict[str, Role]:
+    """Return the roles as a YAML file has them; what it leaves out stays as in `ROLES`.
+
+    Raises:
+        BridgeError: the file cannot be read, or has other roles, keys or values: each with its line.
+    """
+    rules = strict_yaml.load(file, Rules, error=BridgeError)
+    return {name: getattr(rules, name).of(role) for name, role in ROLES.items()}
 
 
 @dataclass(frozen=True)
@@ -97,8 +166,8 @@ class Token:
     name: str
 
 
-def read_tokens(file: Path) -> tuple[Token, ...]:
-    """Return the tokens of a file with lines `TOKEN ROLE [NAME]`; # begins a comment.
+def read_tokens(file: Path, roles: Mapping[str, Role] = ROLES) -> tuple[Token, ...]:
+    """Return the tokens of a file with lines `TOKEN ROLE [NAME]`, a name of these roles; # begins a comment.
 
     Raises:
         BridgeError: the file cannot be read, or a line is of another form; tells no token.
@@ -112,12 +181,12 @@ def read_tokens(file: Path) -> tuple[Token, ...]:
         words = line.partition("#")[0].split(maxsplit=2)
         if not words:
             continue
-        if len(words) < 2 or words[1] not in ROLES or len(words[0]) < 16:
+        if len(words) < 2 or words[1] not in roles or len(words[0]) < 16:
             raise BridgeError(
                 f"{file}:{number}: no token; valid: TOKEN ROLE [NAME], the token of 16 characters at least, "
-                f"the role one of {', '.join(ROLES)}"
+                f"the role one of {', '.join(roles)}"
             )
-        tokens.append(Token(words[0], ROLES[words[1]], words[2] if len(words) > 2 else words[1]))
+        tokens.append(Token(words[0], roles[words[1]], words[2] if len(words) > 2 else words[1]))
     if not tokens:
         raise BridgeError(f"{file} holds no token; valid: lines of TOKEN ROLE [NAME]")
     return tuple(tokens)

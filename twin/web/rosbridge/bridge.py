@@ -108,7 +108,13 @@ class Bridge:
 
     def audit(self, session: Session, op: str, name: str, values: Any) -> None:
         """Write a command down."""
-        line = {"time_ns": time.time_ns(), "client": session.number, "name": session.name}
-        line |= {"role": session.role.name, "op": op, "target": name}
+        who = {"client": session.number, "name": session.name, "role": session.role.name}
         text = json.dumps(values, default=str)
-        self._audit(json.dumps({**line, "values": json.loads(text) if len(text) <= 2000 else text[:2000]}))
+        self._write({**who, "op": op, "target": name}, json.loads(text) if len(text) <= 2000 else text[:2000])
+
+    def audit_stranger(self, address: str, why: str) -> None:
+        """Write down that somebody was not let in."""
+        self._write({"name": address, "op": "connect"}, {"refused": why})
+
+    def _write(self, line: dict[str, Any], values: Any) -> None:
+        self._audit(json.dumps({"time_ns": time.time_ns(), **line, "values": values}))

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 APPEAR_S = 2.0
 """How long a service or an action that nobody offers is waited for [s]."""
 _MOST_CLIENTS = 200
+_MOST_WAITING = 1000
+"""Requests to a service of a client that it has not answered; the oldest is told that nobody will."""
 
 
 @dataclass(eq=False)
@@ -109,6 +111,8 @@ class Calls:
 
         def on_request(request: Any, respond: Respond) -> None:
             key = f"service_request:{service}:{next(self._numbers)}"
+            if len(offered.waiting) >= _MOST_WAITING:
+                offered.waiting.pop(next(iter(offered.waiting)))(None)
             offered.waiting[key] = respond
             session.send_values(
                 {"op": "call_service", "id": key, "service": name, "type": given, "args": to_values(request)}
@@ -130,7 +134,7 @@ class Calls:
         self._withdraw(service)
 
     def respond(self, session: Session, name: str, key: str, values: Any, result: bool) -> None:
-        """Give a client's response to who has asked; one without result leaves them without an answer.
+        """Give a client's response to who has asked; one without result tells them that there is none.
 
         Raises:
             BridgeError: nobody waits for it, or values that its fields cannot hold.
@@ -140,9 +144,7 @@ class Calls:
         if offered is None or offered.session is not session or key not in offered.waiting:
             raise BridgeError(f"nobody waits for the response {key!r} of {service}")
         response = to_message(offered.type.Response, values, self._node.now_ns) if result else None
-        respond = offered.waiting.pop(key)
-        if response is not None:
-            respond(response)
+        offered.waiting.pop(key)(response)
 
     def leave(self, session: Session) -> None:
         """Forget what a client has asked, and end what it offers."""

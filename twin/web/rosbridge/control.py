@@ -10,7 +10,7 @@ from twin.bridge import types
 from twin.bridge.msgs import new
 from twin.bridge.node import Node
 from twin.bridge.qos import LATCHED
-from twin.errors import BridgeError
+from twin.web.rosbridge.access import RefusedError
 
 if TYPE_CHECKING:
     from twin.web.rosbridge.session import Session
@@ -92,12 +92,12 @@ class Control:
         """Take note that a client commands: control is its own if nobody else has it.
 
         Raises:
-            BridgeError: somebody else has it.
+            RefusedError: somebody else has it.
         """
         if self.holder is None:
             self._give(session, "")
         if self.holder is not session:
-            raise BridgeError(f"{self._words}; take it over in the open, by the service {NAME}")
+            raise RefusedError(f"{self._words}; take it over in the open, by the service {NAME}")
         self._until_s = self._now_s() + self._config.lease_s
 
     def steered(self, session: Session, topic: str, message: Any) -> None:

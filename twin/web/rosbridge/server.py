@@ -44,7 +44,9 @@ class ServerConfig:
     port: int = 9090
     """0: any that is free."""
     tokens: tuple[Token, ...] = ()
-    """Empty: everybody is an engineer; only on loopback."""
+    """Empty: everybody may come in; only on loopback."""
+    open_to: Role = ROLES["engineer"]
+    """What everybody is where there are no tokens."""
     origins: tuple[str, ...] = ()
     """Of pages elsewhere that may connect, such as https://hall.example; 'null' is a page from a file."""
     hosts: tuple[str, ...] = ()
@@ -130,6 +132,8 @@ class Server:
         self._stops: deque[_Event] = deque()
         self._events: deque[_Event] = deque()
         self._wrong: dict[str, tuple[int, float]] = {}
+        self._strangers: deque[tuple[str, str]] = deque(maxlen=100)
+        """Who was not let in, and why: for the audit."""
         self._ready = threading.Event()
         self._fault: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -144,6 +148,8 @@ class Server:
         """
         self._thread.start()
         self._ready.wait()
+        if isinstance(self._fault, BridgeError):
+            raise self._fault
         if self._fault is not None:
             where = f"{self._config.address}:{self._config.port}"
             raise BridgeError(f"rosbridge cannot listen on {where}: {self._fault}")
@@ -156,6 +162,8 @@ class Server:
 
     def work(self, bridge: Bridge) -> None:
         """Do what clients want, stops first; called in the bridge's thread."""
+        while self._strangers:
+            bridge.audit_stranger(*self._strangers.popleft())
         for _ in range(len(self._events) + len(self._stops)):
             event = self._stops.popleft() if self._stops else self._events.popleft() if self._events else None
             if event is None:
@@ -187,7 +195,11 @@ class Server:
         config, secure = self._config, None
         if config.certificate is not None:
             secure = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-            secure.load_cert_chain(config.certificate, config.key)
+            try:
+                secure.load_cert_chain(config.certificate, config.key)
+            except (OSError, ssl.SSLError) as fault:
+                files = " and ".join(str(file) for file in (config.certificate, config.key) if file)
+                raise BridgeError(f"{files}: no certificate in PEM with its own key: {fault}") from None
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
         async with serve(
             self._on_client,
@@ -247,7 +259,7 @@ class Server:
         count, since_s = self._wrong.get(peer, (0, 0.0))
         now_s = time.monotonic()
         if count >= _WRONG_TOKENS and now_s - since_s < _LOCKED_S:
-            return None
+            return None  # told of already, ten times
         token = find_token(self._config.tokens, secret)
         if token is not None:
             self._wrong.pop(peer, None)
@@ -255,13 +267,15 @@ class Server:
             if len(self._wrong) > 10_000:
                 self._wrong.clear()
             self._wrong[peer] = (count + 1 if now_s - since_s < _LOCKED_S else 1, now_s)
+            self._strangers.append((peer, "wrong token"))
+            self._wake()
         return token
 
     async def _on_client(self, websocket: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
 
         token: Token | None = getattr(websocket, "token", None)
-        role = token.role if token else None if self._config.tokens else ROLES["engineer"]
+        role = token.role if token else None if self._config.tokens else self._config.open_to
         peer = _peer(websocket)
         assert self._loop is not None
         connection = Connection(token.name if token else peer, role, self._limits, self._loop)

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from twin.bridge.msgs import GoalStatus
 from twin.errors import BridgeError, TwinError
-from twin.web.rosbridge.access import STEERING_TOPICS, STEERING_TYPES, STOPS, Role, matches
+from twin.web.rosbridge.access import (
+    STEERING_SERVICES,
+    STEERING_TOPICS,
+    STEERING_TYPES,
+    STOPS,
+    RefusedError,
+    Role,
+    matches,
+)
 from twin.web.rosbridge.control import NAME as CONTROL
 from twin.web.rosbridge.flow import Wanted
 from twin.web.rosbridge.frames import COMPRESSIONS, Fragments, Frame, in_fragments, to_json
@@ -18,6 +26,8 @@ if TYPE_CHECKING:
 
 _LEVELS = ("none", "error", "warning", "info")
 _LONGEST_TEXT = 300
+_REFUSED_S = 1.0
+"""How often the audit tells that the same was refused [s]: who asks all the time does not fill it."""
 Message = dict[str, Any]
 
 
@@ -38,6 +48,7 @@ class Session:
         self._level = _LEVELS.index("error")
         self._fragments = Fragments(bridge.limits.message_bytes)
         self._number = 0
+        self._refused: dict[tuple[str, str], float] = {}
         self._ops: dict[str, Callable[[Message], None]] = {
             "advertise": self._advertise,
             "unadvertise": self._unadvertise,
@@ -69,6 +80,8 @@ class Session:
                 raise BridgeError(f"the operation {op[:80]!r} is not known; valid: {', '.join(self._ops)}")
             self._ops[op](message)
         except TwinError as error:
+            if isinstance(error, RefusedError):
+                self._audit_refused(message, str(error))
             self.status("error", str(error), key if isinstance(key, str) else None)
 
     def status(self, level: str, text: str, key: str | None = None) -> None:
@@ -86,6 +99,14 @@ class Session:
     def audit(self, op: str, name: str, values: Any = None) -> None:
         """Note a command."""
         self._bridge.audit(self, op, name, values)
+
+    def _audit_refused(self, message: Message, why: str) -> None:
+        target = next((message[field] for field in ("topic", "service", "action") if field in message), "")
+        op, target, now_s = str(message["op"]), str(target)[:_LONGEST_TEXT], self._bridge.now_s()
+        self._refused = {key: at_s for key, at_s in self._refused.items() if now_s - at_s < _REFUSED_S}
+        if (op, target) not in self._refused:
+            self._refused[op, target] = now_s
+            self.audit(op, target, {"refused": why})
 
     def close(self) -> None:
         """End all that the client had. Harmless when repeated."""
@@ -111,17 +132,18 @@ class Session:
         bridge, topic = self._bridge, self._bridge.resolve(_text(message, "topic"))
         self.role.check("topic", topic)
         steers = bridge.topics.type_of(topic) in STEERING_TYPES
-        is_stop = matches(topic, STOPS)
-        if (steers or matches(topic, STEERING_TOPICS)) and not is_stop:
+        is_command = steers or matches(topic, STEERING_TOPICS)
+        if is_command and not matches(topic, STOPS):
             bridge.control.command(self)
         published = bridge.topics.publish(
-            self, topic, message.get("msg"), latch=bool(message.get("latch", False)), is_finite=steers
+            self, topic, message.get("msg"), latch=bool(message.get("latch", False)), is_finite=is_command
         )
         if steers:
             bridge.control.steered(self, topic, published)
         self.audit("publish", topic, message.get("msg"))
 
     def _subscribe(self, message: Message) -> None:
+        self.role.check("heard topic", self._bridge.resolve(_text(message, "topic")))
         compression = message.get("compression", "none") or "none"
         if compression not in COMPRESSIONS:
             raise BridgeError(
@@ -164,6 +186,8 @@ class Session:
         try:
             self.role.check("service", service)
             self._limit(bridge.calls.count(self))
+            if matches(service, STEERING_SERVICES):
+                bridge.control.command(self)
             size = message.get("fragment_size")
             bridge.calls.call(
                 self,
@@ -265,7 +289,7 @@ class Session:
 
     def _may_offer(self) -> None:
         if not self.role.may_offer:
-            raise BridgeError(f"the role {self.role.name} may not offer services or actions")
+            raise RefusedError(f"the role {self.role.name} may not offer services or actions")
 
 
 def _text(message: Message, field: str) -> str:
