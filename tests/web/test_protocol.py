@@ -10,7 +10,16 @@ from tests.web.conftest import World
 from twin.bridge.action_types import Fibonacci
 from twin.bridge.actions import ActionServer
 from twin.bridge.cdr.codec import codec
-from twin.bridge.msgs import Header, PoseStamped, PoseWithCovarianceStamped, String, Twist, TwistStamped, Vector3, new
+from twin.bridge.msgs import (
+    Header,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    String,
+    Twist,
+    TwistStamped,
+    Vector3,
+    new,
+)
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import AddTwoInts, SetBool, Trigger
 from twin.errors import BridgeError

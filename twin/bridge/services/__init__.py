@@ -34,7 +34,7 @@ _QOS = QoS(depth=10)
 _FOREVER_S = 1e8  # like rmw_zenoh, a request has no time-out of its own
 
 Respond = Callable[[Any], None]
-"""Sends the response, or None: then who asked learns that there will be none. May be called in a later spin."""
+"""Sends the response, or None: who asked learns that there is none. May be called in a later spin."""
 
 
 def codecs(srv_type: ServiceType) -> tuple[Codec[Any], Codec[Any]]:

@@ -28,7 +28,10 @@ def rosbridge(
     rules: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", exists=True, dir_okay=False, help="What each role may do, as YAML, see docs/web.md."
+            metavar="FILE",
+            exists=True,
+            dir_okay=False,
+            help="What each role may do, as YAML, see docs/web.md.",
         ),
     ] = None,
     origin: Annotated[

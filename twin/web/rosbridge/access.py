@@ -80,7 +80,7 @@ class Role:
     """Whether it may offer services and actions of its own."""
 
     def allows(self, kind: Kind, name: str) -> bool:
-        """Return whether it may publish a topic, hear one, call a service or send an action of this name goals."""
+        """Return whether it may publish or hear a topic, call a service or send goals to an action."""
         allowed = {
             "topic": self.topics,
             "heard topic": self.heard,
@@ -133,7 +133,12 @@ class RoleRules(StrictModel):
 
     def of(self, role: Role) -> Role:
         """Return a role under these rules."""
-        given = {"topics": self.publish, "heard": self.subscribe, "actions": self.goals, "may_offer": self.offer}
+        given = {
+            "topics": self.publish,
+            "heard": self.subscribe,
+            "actions": self.goals,
+            "may_offer": self.offer,
+        }
         if self.call is not None:
             given |= {"services": self.call, "not_services": ()}
         return replace(role, **{name: value for name, value in given.items() if value is not None})
