@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal
@@ -133,15 +133,19 @@ class RoleRules(StrictModel):
 
     def of(self, role: Role) -> Role:
         """Return a role under these rules."""
-        given = {
-            "topics": self.publish,
-            "heard": self.subscribe,
-            "actions": self.goals,
-            "may_offer": self.offer,
-        }
-        if self.call is not None:
-            given |= {"services": self.call, "not_services": ()}
-        return replace(role, **{name: value for name, value in given.items() if value is not None})
+
+        def chosen(given: tuple[str, ...] | None, usual: tuple[str, ...]) -> tuple[str, ...]:
+            return usual if given is None else given
+
+        return Role(
+            role.name,
+            topics=chosen(self.publish, role.topics),
+            services=chosen(self.call, role.services),
+            actions=chosen(self.goals, role.actions),
+            not_services=role.not_services if self.call is None else (),
+            heard=chosen(self.subscribe, role.heard),
+            may_offer=role.may_offer if self.offer is None else self.offer,
+        )
 
 
 class Rules(StrictModel):
