@@ -16,6 +16,7 @@ from twin.models import load
 from twin.models.description import RobotDescription
 from twin.models.loader import parse_urdf
 from twin.models.specs import CommandSpec
+from twin.sim import drive_check
 from twin.sim.drive_check import (
     DriveReport,
     _check,
@@ -177,6 +178,31 @@ def test_a_report_tells_both_theories_and_asks_less_of_circles_with_unequal_load
         assert report.analytic_track_ratio == pytest.approx(analytic_track_ratio(robot.drive, robot))
         bars[behind] = _circle_bar(robot.drive, robot)
     assert bars == {0.0: 0.5, 0.05: 2.5}
+
+
+def test_a_robot_that_has_turned_does_not_turn_again_and_another_one_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    turns: list[float] = []
+    spin = ProvingGround.spin
+    monkeypatch.setattr(ProvingGround, "spin", lambda self, angle: turns.append(angle) or spin(self, angle))
+    drive_check._CALIBRATED.clear()
+    robot = cart(30.0, 0.1, 0.5, (0.2, -0.2))
+    first = calibrated_track_ratio(convert(robot), timestep=0.002)
+    count = len(turns)
+    assert calibrated_track_ratio(convert(robot), timestep=0.002) == first
+    assert len(turns) == count
+    calibrated_track_ratio(convert(robot), timestep=0.004)
+    assert len(turns) > count
+    count = len(turns)
+    wider = calibrated_track_ratio(convert(cart(30.0, 0.1, 0.6, (0.2, -0.2))), timestep=0.002)
+    assert len(turns) > count
+    assert wider != first
+    heavier = convert(robot)
+    heavier.spec.bodies[1].mass *= 3.0
+    count = len(turns)
+    calibrated_track_ratio(heavier, timestep=0.002)
+    assert len(turns) > count
 
 
 def test_only_skid_steers_are_calibrated() -> None:
