@@ -1,0 +1,108 @@
+"""What goes to other computers: the image is built and runs a scenario, compose and systemd name what there is."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+PACKAGING = ROOT / "packaging"
+Run = Callable[..., str]
+
+
+def run(*command: str | Path, cwd: Path = ROOT) -> str:
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, cwd=cwd)
+    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-6000:]}"
+    return done.stdout
+
+
+@pytest.fixture
+def buildah(tmp_path: Path) -> Iterator[Run]:
+    """Return what runs buildah with a storage of its own."""
+    store = tmp_path / "store"
+    options = ["--root", store, "--runroot", tmp_path / "runroot", "--storage-driver", "vfs"]
+    yield lambda *words: run("buildah", *options, *words)
+    shutil.rmtree(store, ignore_errors=True)  # some GB
+
+
+def why_no_images() -> str:
+    if os.geteuid() != 0:
+        return "only root builds images without a daemon"
+    lacks = [name for name in ("buildah", "mmdebstrap") if shutil.which(name) is None]
+    return f"needs {' and '.join(lacks)}: apt-get install {' '.join(lacks)}" if lacks else ""
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1500)
+@pytest.mark.skipif(bool(why_no_images()), reason=why_no_images() or "-")
+def test_the_image_runs_a_scenario_as_nobody_special(buildah: Run, tmp_path: Path) -> None:
+    wheels, base = tmp_path / "wheels", tmp_path / "base.tar"
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--constraint", ROOT / "constraints.txt"]
+    run(*pip, "--wheel-dir", wheels, f"{ROOT}[web]", "setuptools", "wheel")
+    run("mmdebstrap", "--variant=minbase", "--include=python3-venv,ca-certificates", "bookworm", base)
+    empty = buildah("from", "scratch").strip()
+    buildah("add", "--quiet", empty, base, "/")
+    buildah("commit", "--quiet", "--rm", empty, "twin-base")
+    base.unlink()
+    buildah(
+        "bud", "--isolation", "chroot", "--format", "docker", "--build-arg", "BASE=localhost/twin-base",
+        "--build-arg", "PIP_NO_INDEX=1", "--build-arg", "PIP_FIND_LINKS=/wheels",
+        "--volume", f"{wheels}:/wheels:ro", "--file", PACKAGING / "Containerfile", "--tag", "twin", ROOT,
+    )  # fmt: skip
+    image: dict[str, Any] = json.loads(buildah("inspect", "--type", "image", "localhost/twin"))["Docker"]
+    config = image["config"]
+    assert "9090" in " ".join(config["Healthcheck"]["Test"])
+    assert config["ExposedPorts"].keys() == {"7447/tcp", "9090/tcp"}
+    container = buildah("from", "localhost/twin").strip()
+
+    def inside(*words: str) -> str:
+        return buildah("run", "--isolation", "chroot", container, "--", *words)
+
+    assert inside("id", "-u").strip() == "1000"
+    assert "PASS" in inside(*config["Entrypoint"], "run", "diff_bot_figure8", "--no-record")
+    assert "usage" in inside(*config["Entrypoint"], *config["Cmd"], "--help").lower()
+
+
+def services() -> dict[str, Any]:
+    services: dict[str, Any] = yaml.safe_load((PACKAGING / "compose.yaml").read_text("utf-8"))["services"]
+    return services
+
+
+@pytest.mark.parametrize("name", ["router", "run", "page"])
+def test_compose_says_commands_that_there_are(name: str) -> None:
+    """With `--help` behind them, which no unknown option survives."""
+    command = services()[name]["command"]
+    assert "Usage" in run(sys.executable, "-m", "twin.cli", *command, "--help")
+    assert services()[name]["network_mode"] == "host"
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze to ask")
+def test_the_unit_is_one_that_systemd_takes(tmp_path: Path) -> None:
+    text = (PACKAGING / "twin-rosbridge.service").read_text("utf-8")
+    program = tmp_path / "twin"
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    unit = tmp_path / "twin-rosbridge.service"
+    unit.write_text(text.replace("/opt/twin/bin/twin", str(program)))
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--man=no", unit], capture_output=True, text=True, check=False
+    )
+    told = [line for line in done.stderr.splitlines() if "twin-rosbridge" in line]
+    assert told == []
+
+
+def test_the_unit_starts_a_command_that_there_is() -> None:
+    text = (PACKAGING / "twin-rosbridge.service").read_text("utf-8")
+    (start,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
+    program, *words = start.removeprefix("ExecStart=").split()
+    assert program == "/opt/twin/bin/twin"
+    assert "Usage" in run(sys.executable, "-m", "twin.cli", *words, "--help")
