@@ -1,4 +1,4 @@
-"""What is left of runs that are over: nothing that a fork would miss."""
+"""What is left of runs that are over, nothing that a fork would miss; and what they need not load."""
 
 from __future__ import annotations
 
@@ -46,6 +46,16 @@ told["child"] = json.loads(os.read(ends[0], 4096))
 told["again"] = digest("again")
 print(json.dumps(told))
 """
+
+
+def test_navigation_loads_no_linear_algebra() -> None:
+    """A kernel that lets numba take an extremum of an array would load SciPy's, for 0.2 s in the loop."""
+    run = "import sys, twin; twin.run(sys.argv[1], overrides={'duration': '3 s'}); print(*sys.modules)"
+    command = [sys.executable, "-c", run, str(SCENARIOS / "warehouse.yaml")]
+    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    loaded = told.split()
+    assert "numba" in loaded
+    assert "scipy.linalg" not in loaded
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="no /proc")

@@ -1,6 +1,7 @@
 """The one way this package compiles a function: numba, cached on disk, typed as the Python function.
 
 Copy an array by a loop: to assign one to a slice compiles numba's message about shapes, too, for a second.
+Take sums and extrema of an array by a loop, too: numba's own load SciPy's linear algebra, for 0.2 s of CPU.
 """
 
 from __future__ import annotations

@@ -166,8 +166,10 @@ def footprint_hits(costs: Cells, corners: Array, pose: Triple, frame: Triple) ->
     c, s = math.cos(yaw), math.sin(yaw)
     n = corners.shape[0]
     half = resolution / 2.0
-    low_x, high_x = corners[:, 0].min(), corners[:, 0].max()
-    low_y, high_y = corners[:, 1].min(), corners[:, 1].max()
+    low_x, low_y = high_x, high_y = corners[0, 0], corners[0, 1]
+    for k in range(1, n):
+        low_x, high_x = min(low_x, corners[k, 0]), max(high_x, corners[k, 0])
+        low_y, high_y = min(low_y, corners[k, 1]), max(high_y, corners[k, 1])
     hits = 0
     for i in range(math.floor((high_x - low_x) / half) + 1):
         for j in range(math.floor((high_y - low_y) / half) + 1):
