@@ -1,4 +1,4 @@
-"""What goes to other computers: the image is built and runs a scenario, compose and systemd name what there is."""
+"""What goes to other computers: an image is built and runs, compose and systemd name what there is."""
 
 from __future__ import annotations
 
