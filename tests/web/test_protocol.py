@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,9 @@ from twin.bridge.msgs import (
 )
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import AddTwoInts, SetBool, Trigger
+from twin.bridge.tf import TransformBroadcaster, transform_stamped
 from twin.errors import BridgeError
+from twin.geometry import Pose3
 from twin.web.rosbridge.access import ROLES, read_rules
 
 TWIST = "geometry_msgs/msg/Twist"
@@ -454,3 +457,70 @@ def test_a_client_has_a_limited_number_of_subscriptions(world: World) -> None:
     assert [len(errors(each)) for each in told] == [0] * 64 + [1]
     client.session.close()
     assert world.bridge.topics._sources == {}
+
+
+def republishing(world: World) -> Callable[[float], None]:
+    """Return what moves `base` along x under `odom`."""
+    broadcaster = TransformBroadcaster(world.bus.create_node("robot"))
+    base = Pose3.from_xyz_rpy
+
+    def move(x: float) -> None:
+        broadcaster.send_transform(
+            transform_stamped("odom", "base", world.bus.clock.now_ns, base((x, 0.0, 0.0)))
+        )
+        world.spin(0.2)
+
+    return move
+
+
+def test_transforms_come_when_they_have_changed(world: World) -> None:
+    move, viewer = republishing(world), world.client("viewer")
+    wanted = {"source_frames": ["base", "/nowhere"], "target_frame": "odom", "trans_thres": 0.1}
+    kind = "tf2_web_republisher_msgs/TFSubscription"  # as roslibjs spells it
+    goal = {"action": "/tf2_web_republisher", "action_type": kind, "feedback": True}
+    assert viewer.tell("send_action_goal", id="g", args=wanted, **goal) == []
+
+    def heard() -> list[float]:
+        told = [each["values"]["transforms"] for each in viewer.heard() if each["op"] == "action_feedback"]
+        return [one["transform"]["translation"]["x"] for each in told for one in each]
+
+    move(1.0)
+    move(1.05)
+    assert heard() == [1.0]
+    move(1.15)
+    move(2.0)
+    assert heard() == [1.15, 2.0]
+    told = viewer.tell("cancel_action_goal", id="g", action="/tf2_web_republisher")
+    world.spin(0.2)
+    assert [each["status"] for each in (*told, *viewer.heard()) if each["op"] == "action_result"] == [5]
+    move(9.0)
+    assert heard() == []
+    viewer.tell("send_action_goal", id="h", args=wanted, **goal)
+    assert world.bridge.transforms.is_waiting
+    viewer.session.close()
+    world.spin(0.2)
+    assert not world.bridge.transforms.is_waiting
+    assert world.bridge.control.holder is None
+
+
+def test_transforms_on_a_topic_end_when_nobody_hears_them(world: World) -> None:
+    move, viewer = republishing(world), world.client("viewer")
+    wanted = {"source_frames": ["base"], "target_frame": "odom", "rate": 10.0, "timeout": {"sec": 2}}
+    (told,) = viewer.tell("call_service", service="/republish_tfs", args=wanted)
+    topic = told["values"]["topic_name"]
+    assert viewer.tell("subscribe", topic=topic) == []
+    move(1.0)
+    (told,) = viewer.heard()
+    assert [each["child_frame_id"] for each in told["msg"]["transforms"]] == ["base"]
+    world.spin(5.0)
+    move(2.0)
+    assert len(viewer.heard()) == 1
+    viewer.tell("unsubscribe", topic=topic)
+    world.spin(1.0)
+    assert world.bridge.transforms.is_waiting
+    world.spin(1.5)
+    assert not world.bridge.transforms.is_waiting
+    for _ in range(150):
+        viewer.session.handle({"op": "call_service", "service": "/republish_tfs", "args": wanted})
+        world.spin()
+    assert len(world.bridge.transforms._topics) == 100

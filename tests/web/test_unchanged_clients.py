@@ -114,6 +114,7 @@ def test_roslib(variable: str, script: str, tmp_path: Path) -> None:
         assert told == {
             "none": True, "png": True, "cbor": True, "cbor-raw": 24, "topics": True, "nodes": True,
             "message_details": 2, "service": True, "offered": "on", "action": [True, "number"], "param": 69,
+            "tf": 0.75,
         }  # fmt: skip
 
 

@@ -25,5 +25,11 @@ const result = await within(new Promise((ok, no) => action.sendGoal({ theta: 0.3
 say('action', [feedback > 0, typeof result.delta]);
 const param = new ROSLIB.Param({ ros, name: '/turtlesim:background_r' });
 say('param', await within(new Promise((ok, no) => param.get(ok, no))));
+const tf = new ROSLIB.Topic({ ros, name: '/tf', messageType: 'tf2_msgs/msg/TFMessage' });
+const lone = { header: { frame_id: 'world' }, child_frame_id: 'thing', transform: { translation: { x: 0.75, y: 0, z: 0 }, rotation: { x: 0, y: 0, z: 0, w: 1 } } };
+const telling = setInterval(() => tf.publish({ transforms: [lone] }), 100);
+const listening = new ROSLIB.ROS2TFClient({ ros, fixedFrame: 'world', angularThres: 0.01, transThres: 0.01, rate: 10 });
+say('tf', (await within(new Promise((ok) => listening.subscribe('thing', ok)))).translation.x);
+clearInterval(telling);
 ros.close();
 process.exit(0);

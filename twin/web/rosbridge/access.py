@@ -23,7 +23,7 @@ EVERYTHING = ("*",)
 _READING = (
     "/rosapi/*", "/twin/control", "*/get_parameters", "*/get_parameter_types", "*/list_parameters",
     "*/describe_parameters", "*/get_type_description", "*/get_state", "*/get_available_*", "*/get_map",
-    "*/get_costmap", "*/get_cost", "*/map_server/map", "*/is_path_valid", "*/tf2_frames",
+    "*/get_costmap", "*/get_cost", "*/map_server/map", "*/is_path_valid", "*/tf2_frames", "/republish_tfs",
 )  # fmt: skip
 _CHANGING = ("/rosapi/set_param", "/rosapi/delete_param")
 _OPERATING = (
@@ -39,6 +39,8 @@ _TALKING = (
 
 STOPS = ("*/guard/stop", "*/emergency_stop", "*/e_stop", "*/estop")
 """Names by which a robot is stopped: such a command overtakes all others and needs no control."""
+READING_ACTIONS = ("/tf2_web_republisher",)
+"""Actions that only tell something: their goals need no control, and end with the client that sent them."""
 STEERING_TYPES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 """Velocities: who sends them steers, and stops if it falls silent."""
 STEERING_TOPICS = (
@@ -103,7 +105,7 @@ class Role:
 ROLES = {
     role.name: role
     for role in (
-        Role("viewer", services=_READING, not_services=_CHANGING),
+        Role("viewer", services=_READING, actions=READING_ACTIONS, not_services=_CHANGING),
         Role(
             "operator",
             topics=_TALKING,

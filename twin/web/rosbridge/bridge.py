@@ -18,6 +18,7 @@ from twin.web.rosbridge.goals import Goals
 from twin.web.rosbridge.learner import Learner
 from twin.web.rosbridge.rosapi import Rosapi
 from twin.web.rosbridge.session import Session
+from twin.web.rosbridge.tf_republisher import TfRepublisher
 from twin.web.rosbridge.topics import Topics
 
 
@@ -63,6 +64,7 @@ class Bridge:
         self.goals = Goals(self.node, graph, learner, now_s)
         self.control = Control(self.node, config.control, now_s, self.topics.say)
         self.rosapi = Rosapi(bus, graph, now_s)
+        self.transforms = TfRepublisher(bus, now_s)
         self._learner, self._audit = learner, config.audit
         self._count = 0
         self._sessions: set[Session] = set()
@@ -70,7 +72,7 @@ class Bridge:
     @property
     def is_waiting(self) -> bool:
         """Whether `update` has something to do soon."""
-        parts = (self.topics, self.calls, self.goals, self.control)
+        parts = (self.topics, self.calls, self.goals, self.control, self.transforms)
         return any(part.is_waiting for part in parts)
 
     def join(self, name: str, role: Role, send: Callable[[Frame, str | None], None]) -> Session:
@@ -95,6 +97,7 @@ class Bridge:
         self.topics.update()
         self.calls.update()
         self.goals.update()
+        self.transforms.update()
         self._learner.update(self.now_s())
 
     def resolve(self, name: str) -> str:

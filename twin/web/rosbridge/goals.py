@@ -14,6 +14,7 @@ from twin.bridge.graph import Graph
 from twin.bridge.msgs import GoalStatus, new
 from twin.bridge.node import Node
 from twin.errors import BridgeError
+from twin.web.rosbridge.access import READING_ACTIONS, matches
 from twin.web.rosbridge.calls import APPEAR_S
 from twin.web.rosbridge.learner import Learner, type_name
 from twin.web.rosbridge.values import to_message, to_values
@@ -184,7 +185,13 @@ class Goals:
         executed.done = True
 
     def leave(self, session: Session) -> None:
-        """End what a client offers; goals that it has sent go on, as after a page is loaded again."""
+        """End what a client offers; goals that it has sent go on, as after a page is loaded again.
+
+        Not those that only tell something: nobody would hear it.
+        """
+        for sent in self._sent:
+            if sent.session is session and sent.goal is not None and matches(sent.name, READING_ACTIONS):
+                sent.goal.cancel()
         self._sent = [sent for sent in self._sent if sent.session is not session]
         for action, offered in tuple(self._offered.items()):
             if offered.session is session:

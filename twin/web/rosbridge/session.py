@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from twin.bridge.msgs import GoalStatus
 from twin.errors import BridgeError, TwinError
 from twin.web.rosbridge.access import (
+    READING_ACTIONS,
     STEERING_SERVICES,
     STEERING_TOPICS,
     STEERING_TYPES,
@@ -226,7 +227,9 @@ class Session:
         try:
             self.role.check("action", action)
             self._limit(bridge.goals.count(self))
-            bridge.control.command(self)
+            is_command = not matches(action, READING_ACTIONS)
+            if is_command:
+                bridge.control.command(self)
             bridge.goals.send(
                 self,
                 key,
@@ -239,7 +242,8 @@ class Session:
             answer = answer if key is None else {**answer, "id": key}
             self.send_values({**answer, "status": GoalStatus.STATUS_UNKNOWN, "result": False})
             raise
-        self.audit("send_action_goal", action, message.get("args"))
+        if is_command:
+            self.audit("send_action_goal", action, message.get("args"))
 
     def _cancel_action_goal(self, message: Message) -> None:
         self._bridge.goals.cancel(self, _id(message), _text(message, "action"))
