@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PACKAGING = ROOT / "packaging"
 Run = Callable[..., str]
 
@@ -101,7 +101,7 @@ def test_the_unit_is_one_that_systemd_takes(tmp_path: Path) -> None:
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)
     unit = tmp_path / "twin-rosbridge.service"
-    unit.write_text(text.replace("/opt/twin/bin/twin", str(program)))
+    unit.write_text(text.replace("/usr/local/lib/twin/bin/twin", str(program)))
     done = subprocess.run(
         ["systemd-analyze", "verify", "--man=no", unit], capture_output=True, text=True, check=False
     )
@@ -113,5 +113,5 @@ def test_the_unit_starts_a_command_that_there_is() -> None:
     text = (PACKAGING / "twin-rosbridge.service").read_text("utf-8")
     (start,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
     program, *words = start.removeprefix("ExecStart=").split()
-    assert program == "/opt/twin/bin/twin"
+    assert program == "/usr/local/lib/twin/bin/twin"
     assert "Usage" in run(sys.executable, "-m", "twin.cli", *words, "--help")
