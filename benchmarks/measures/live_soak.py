@@ -116,9 +116,9 @@ def soak(minutes: float) -> None:
         (at_s, label, want) for at_s, label in seconds if (want := expected(at_s, done)) and label != want
     ]
     print(f"label: {len(seconds)} s, wrong in {len(wrong)}: {wrong[:20]}")
-    resets = [text for _, text in told if text.startswith("reset: ")]
+    resets = [f"{at_s:.1f} s {text}" for at_s, text in told if text.startswith("reset: ")]
     lost = sum(text.startswith("pace: ") for _, text in told)
-    print(f"put elsewhere {len(resets)} times, lost time {lost} times")
+    print(f"put elsewhere {len(resets)} times, lost time {lost} times", *resets, sep="\n  ")
     print("memory [MB], a minute each:", " ".join(f"{each:.0f}" for each in memory))
 
 
@@ -144,6 +144,8 @@ def expected(at_s: float, done: list[tuple[float, str]]) -> str | None:
     """Return the label that is right, None where more than one is."""
     since = [(at_s - began_s, what) for began_s, what in done if began_s <= at_s]
     passed_s, what = since[-1] if since else (at_s, "started")
+    if any(what == "kidnapped" and 0.0 < began_s - at_s < EARLY_S for began_s, what in done):
+        return None
     if what == "stopped" and DEGRADED_S < passed_s < 3.0:
         return "shadow"
     if what == "killed" and passed_s > 5.0 + DEGRADED_S:
