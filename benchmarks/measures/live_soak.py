@@ -27,8 +27,8 @@ KIDNAPPED_S, STOPPED_S, SLOWED_S, KILLED_S, AGAIN_S = 90.0, 150.0, 210.0, 280.0,
 """When, in a round; the robot is there some seconds after it was started."""
 MOST = 300
 """Letters of a line."""
-EARLY_S = 6.0
-"""A robot that was there sooner is carried away sooner."""
+EARLY_S, FIRST_EARLY_S = 6.0, 20.0
+"""A robot that was there sooner is carried away sooner; the first is there before the mirror is built."""
 DEGRADED_S = 0.6
 """After a robot falls silent the label may say `twin` for so long."""
 RECOVERED_S = 30.0
@@ -144,7 +144,8 @@ def expected(at_s: float, done: list[tuple[float, str]]) -> str | None:
     """Return the label that is right, None where more than one is."""
     since = [(at_s - began_s, what) for began_s, what in done if began_s <= at_s]
     passed_s, what = since[-1] if since else (at_s, "started")
-    if any(what == "kidnapped" and 0.0 < began_s - at_s < EARLY_S for began_s, what in done):
+    early_s = FIRST_EARLY_S if at_s < ROUND_S else EARLY_S
+    if any(what == "kidnapped" and 0.0 < began_s - at_s < early_s for began_s, what in done):
         return None
     if what == "stopped" and DEGRADED_S < passed_s < 3.0:
         return "shadow"
