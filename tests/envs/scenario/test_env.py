@@ -33,6 +33,12 @@ def first_of(env: ScenarioEnv, seed: int | None = None) -> str:
     return hashlib.sha256(b"".join(observation[key].tobytes() for key in sorted(observation))).hexdigest()
 
 
+def step_once(env: ScenarioEnv) -> None:
+    """Begin a run, and decide once."""
+    env.reset()
+    env.step(env.action_space.sample())
+
+
 def resident() -> int:
     """Return what the process holds [bytes], without what is free already and only kept for later."""
     gc.collect()
@@ -216,16 +222,18 @@ def test_what_is_wrong_in_a_term_or_agent_of_ones_own_is_told_with_its_line(
         def act(self, action: Any) -> None:
             raise ZeroDivisionError
 
+    class Deaf(Drive):
+        def asks(self) -> bool:
+            raise KeyError("nobody")
+
     monkeypatch.setitem(TERMS, "cold", Cold)
     for options, said in (
         ({"reward": {"cold": 1.0}}, r"test_env\.py:\d+: the reward of Cold fails: ValueError: too cold"),
         ({"agent": Lazy}, r"test_env\.py:\d+: act of Lazy fails: ZeroDivisionError"),
+        ({"agent": Deaf}, r"test_env\.py:\d+: asks of Deaf fails: KeyError: 'nobody'"),
     ):
-        env = twin.make_env(small, **options)
-        env.reset()
-        with pytest.raises(GymError, match=said):
-            env.step(env.action_space.sample())
-        env.close()
+        with twin.make_env(small, **options) as env, pytest.raises(GymError, match=said):
+            step_once(env)
 
 
 @pytest.mark.parametrize(

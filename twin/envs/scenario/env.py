@@ -226,15 +226,21 @@ class ScenarioEnv(gym.Env[dict[str, Values], Values]):
     def _advance(self, ticks: int) -> None:
         """Go on for so many ticks, and until the agent is asked."""
         episode, agent = self.episode, self._agent
-        if ticks == 0 and agent.asks():
+
+        def asks() -> bool:
+            with blamed(self._kind, "asks"):
+                return agent.asks()
+
+        if ticks == 0 and asks():
             return
         left = ticks
 
         def due() -> bool:
             nonlocal left
             left -= 1
-            agent.watch()
-            return left <= 0 and agent.asks()
+            with blamed(self._kind, "watch"):
+                agent.watch()
+            return left <= 0 and asks()
 
         try:
             episode.advance(due)

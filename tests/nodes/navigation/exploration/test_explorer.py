@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy as np
 from tests.nodes.conftest import ORIGIN, Bench, Robot, open_room
 from twin.bridge.action_types import NavigateToPose
 from twin.bridge.actions import ActionServer, GoalHandle
+from twin.bridge.bus import Bus
+from twin.bridge.clock import Clock
 from twin.bridge.conversions import pose2_from_pose
 from twin.bridge.msgs import Bool, ExploreStatus, MarkerArray, OccupancyGrid, new
 from twin.bridge.qos import LATCHED
@@ -129,6 +132,29 @@ def test_it_pauses_and_resumes(bench: Bench) -> None:
     resume.publish(Bool(data=True))
     bench.until(lambda: len(place.navigator.goals) > 1, 5.0)
     assert told[1:] == ["exploration_paused", "exploration_in_progress"]
+
+
+@dataclass(slots=True)
+class SettableClock(Clock):
+    """Somebody sets it back; durations are not told."""
+
+    back_ns: int = 0
+
+    @property
+    def steady_ns(self) -> int:
+        return self.now_ns + self.back_ns
+
+
+def test_it_goes_on_where_the_clock_was_set_back() -> None:
+    clock = SettableClock(now_ns=7200_000_000_000)
+    with Bus.open(clock) as bus:
+        bench = Bench(bus, clock)
+        place = Place(bench)
+        place.navigator.fails = True
+        bench.until(lambda: place.node.explorer.given_up, 5.0)
+        clock.now_ns, clock.back_ns = clock.now_ns - 3600_000_000_000, 3600_000_000_000
+        bench.until(lambda: place.mission.done, 30.0)
+        assert len(place.node.explorer.given_up) >= 2
 
 
 def test_frontiers_are_shown_to_who_listens(bench: Bench) -> None:

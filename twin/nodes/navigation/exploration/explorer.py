@@ -122,6 +122,8 @@ class ExplorerNode:
             return
         if self._home is None:
             self._home = pose
+        # The clock may have been set back: no map comes from after now.
+        self._looked_ns = min(self._looked_ns, self.node.now_ns)
         if self._map_ns <= self._looked_ns:
             return
         self._looked_ns = self._map_ns
