@@ -18,6 +18,7 @@ from twin.nodes.cameras.messages import compressed_depth
 from twin.recording.read_back import read
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import Scenario
+from twin.scenario.verdict import Images
 
 Load = Callable[[str], Scenario]
 TOPICS = (
@@ -69,6 +70,28 @@ def test_nothing_is_drawn_that_nobody_wants_and_to_look_changes_nothing(
     recorded = OpenRun(scenario(text()), out=tmp_path, bag=tmp_path / "bag")
     recorded.advance()
     assert digests == {recorded.finish().digest}
+
+
+@needs_opengl
+def test_pixels_are_the_same_from_run_to_run_and_the_verdict_names_who_drew_them(scenario: Load) -> None:
+    def images(kind: str, *topics: str) -> Images | None:
+        run = OpenRun(scenario(text(kind=kind)), record=False)
+        Audience(run, *topics)
+        run.advance()
+        return run.finish().images
+
+    seen = images("rgbd_camera", "camera/image_raw", "camera/depth/image_raw")
+    assert seen is not None
+    assert seen.drawn == 6
+    assert any(name in seen.renderer for name in ("Mesa", "llvmpipe", "OpenGL", "NVIDIA"))
+    assert images("rgbd_camera", "camera/image_raw", "camera/depth/image_raw") == seen
+    others = [
+        images("rgbd_camera", "camera/image_raw"),
+        images("rgbd_camera", "camera/depth/image_raw"),
+        images("segmentation", "camera/ground_truth/labels_map"),
+    ]
+    assert len({each.digest for each in (seen, *others) if each is not None}) == 4
+    assert images("rgbd_camera") is None
 
 
 @needs_opengl

@@ -33,7 +33,7 @@ from twin.savings import ALL, Savings, seldom_collected, uncollected
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.provenance import Provenance, cpu_class, versions
 from twin.scenario.schema import Scenario
-from twin.scenario.verdict import Label, Verdict
+from twin.scenario.verdict import Images, Label, Verdict
 
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
@@ -359,6 +359,7 @@ class OpenRun:
         navigators = [s.navigator for s in run.parts.stacks.values() if s.navigator is not None]
         refused = sorted(run.bus.refused.items())  # of what came from outside; none without a network
         clock = self._outside.clock(run.bus.networked)
+        pictures = run.world.pictures
         return Verdict(
             scenario=run.scenario.name,
             seed=run.scenario.seed,
@@ -375,6 +376,7 @@ class OpenRun:
                 **({"trailing_bytes": float(run.bus.trailing)} if run.bus.trailing else {}),
             },
             digest=self.digest.finish(run.world.state_digest()),
+            images=None if pictures is None else Images(**pictures._asdict()),
             deterministic=clock != "free" and not (run.lockstep and run.lockstep.surplus),
             clock=clock,
             versions=versions(),

@@ -25,6 +25,18 @@ EXIT_CODES = {"pass": 0, "fail": 1, "error": 2, "inconclusive": 3}
 
 
 @dataclass(frozen=True, kw_only=True)
+class Images:
+    """All that was drawn for cameras: pixel by pixel the same in runs that were looked at alike."""
+
+    digest: str
+    """Of the pixels that OpenGL drew; on one machine, with one version of the renderer."""
+    drawn: int
+    """How many pictures."""
+    renderer: str
+    """Who drew."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Verdict:
     """The outcome of one run."""
 
@@ -37,6 +49,8 @@ class Verdict:
     """`sim_time_s`, `wall_time_s`, `cpu_time_s`, `real_time_factor`, `recoveries`; of some runs more."""
     digest: str | None = None
     """SHA-256 over every published sample and the final physics state; None if the run was not finished."""
+    images: Images | None = None
+    """What cameras saw; None if nobody looked."""
     deterministic: bool = True
     """False if something outside of the process could change the run."""
     clock: Literal["inproc", "lockstep", "free"] = "inproc"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import ctypes
 import ctypes.util
 import os
 import sys
@@ -23,6 +24,9 @@ BACKENDS = {"egl": "EGL", "osmesa": "OSMesa"}
 PACKAGES = "`apt-get install libegl1 libgl1-mesa-dri`, or `libosmesa6` and MUJOCO_GL=osmesa"
 """Where both are."""
 
+_FINDS = {"egl": "eglGetProcAddress", "osmesa": "OSMesaGetProcAddress"}
+"""What finds a function of OpenGL by its name."""
+_GL_RENDERER, _GL_VERSION = 0x1F01, 0x1F02
 _FLAGS = mujoco.mjtRndFlag
 _PLAIN = {_FLAGS.mjRND_SEGMENT: 1, _FLAGS.mjRND_IDCOLOR: 1}
 """For a picture of distances or numbers: no light, and no sky, which is a box before the far plane."""
@@ -83,6 +87,12 @@ class Canvas:
     def _frame(self, width: int | None, height: int | None) -> mujoco.MjrRect:
         return mujoco.MjrRect(0, 0, width or self._size[0], height or self._size[1])
 
+    @property
+    def renderer(self) -> str:
+        """Who draws, as OpenGL calls it, such as `llvmpipe (LLVM 15.0.6, 256 bits), 4.5 Mesa 22.3.6`."""
+        self._opengl.make_current()
+        return ", ".join(_gl_strings(_GL_RENDERER, _GL_VERSION)) or "OpenGL"
+
     def close(self) -> None:
         """Free what the graphics driver holds. Harmless when repeated."""
         atexit.unregister(self._free)
@@ -117,6 +127,17 @@ def _opengl(width: int, height: int) -> Any:
             f"MuJoCo finds no OpenGL without a display ({fault}); it needs EGL or OSMesa ({PACKAGES})"
         ) from fault
     return context
+
+
+def _gl_strings(*names: int) -> list[str]:
+    """Return what the current context says of itself; PyOpenGL may be set to another library."""
+    backend = _backend()
+    if backend not in _FINDS:
+        return []
+    find = getattr(ctypes.CDLL(ctypes.util.find_library(BACKENDS[backend])), _FINDS[backend])
+    find.restype = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_uint)
+    get_string = find(b"glGetString")
+    return [get_string(name).decode() for name in names]
 
 
 def _backend() -> str:

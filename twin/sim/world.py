@@ -31,7 +31,7 @@ from twin.sim.work import StepMeter, StepWatch, WorkMeter
 if TYPE_CHECKING:
     from twin.sim.alterations import Alterations
     from twin.sim.cameras.camera import Camera
-    from twin.sim.cameras.eyes import Eyes
+    from twin.sim.cameras.eyes import Eyes, Pictures
     from twin.sim.cameras.labels import TrueEyes
 
 
@@ -322,6 +322,14 @@ class World:
         from twin.sim.cameras.labels import TrueEyes
 
         return TrueEyes(self, [camera for camera in self._cameras if camera.spec.truth])
+
+    @property
+    def pictures(self) -> Pictures | None:
+        """What was drawn for cameras so far: what they see, and which things; None if nobody looked."""
+        eyes, true_eyes = self.__dict__.get("eyes"), self.__dict__.get("true_eyes")
+        each = [] if eyes is None else [eyes.pictures]
+        each += [] if true_eyes is None else [true_eyes.eyes.pictures]
+        return each[0].and_those_of(*each[1:]) if each else None
 
     @property
     def _cameras(self) -> list[Camera]:

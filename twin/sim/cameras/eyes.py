@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from xxhash import xxh3_128
 
 from twin.convert.sensors import add_camera
 from twin.errors import SimulationError
+from twin.models.specs import CameraSpec
 from twin.sim.canvas import Canvas
 from twin.sim.compose import GROUP_PAINT
 
@@ -19,10 +23,28 @@ if TYPE_CHECKING:
     from twin.sim.cameras.camera import Camera
     from twin.sim.world import World
 
-
+_LOG = logging.getLogger("twin.camera")
 SHADOW_SIZE = 2048
 """Pixels along the edge of what is drawn from where the light is: in a hall of 20 m, of 1.4 cm each."""
 _NO_COLOURS, _NO_DEPTH = np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32)
+
+
+class Pictures(NamedTuple):
+    """All that was drawn of a world so far."""
+
+    digest: str
+    """Of the pixels of each, with its camera and the physics step, before lens and noise."""
+    drawn: int
+    """How many."""
+    renderer: str
+    """Who drew; another one, or another version of it, may draw other pixels."""
+
+    def and_those_of(self, *others: Pictures) -> Pictures:
+        """Return all of them as one."""
+        if not others:
+            return self
+        digest = xxh3_128("".join(each.digest for each in (self, *others)).encode()).hexdigest()
+        return Pictures(digest, self.drawn + sum(each.drawn for each in others), self.renderer)
 
 
 class Eyes:
@@ -57,6 +79,11 @@ class Eyes:
         self._step = -1
         self.drawn = 0
         """How many pictures."""
+        self._hash = xxh3_128()
+        self.renderer = self._canvas.renderer
+        """Who draws, as OpenGL calls it."""
+        each = ", ".join(_words(camera.spec) for camera in cameras)
+        _tell(f"{each}: drawn by {self.renderer}; docs/cameras.md tells what that costs a run")
 
     def look(
         self, camera: Camera, *, colours: bool, depth: bool
@@ -79,6 +106,7 @@ class Eyes:
         if depth:
             self._update(camera, paint=False)
             distances = _metres(self._canvas.nearness(self._scene, *size), near, far)
+        self._add(camera, seen, distances)
         return seen, distances
 
     def geoms(self, camera: Camera) -> NDArray[np.intp]:
@@ -95,11 +123,23 @@ class Eyes:
         for geom in self._scene.geoms[: self._scene.ngeom]:
             if geom.segid >= 0 and geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:
                 shown[geom.segid + 1] = geom.objid
-        return shown[numbers]
+        found: NDArray[np.intp] = shown[numbers]
+        self._add(camera, found)
+        return found
+
+    @property
+    def pictures(self) -> Pictures:
+        """What was drawn so far."""
+        return Pictures(self._hash.hexdigest(), self.drawn, self.renderer)
 
     def close(self) -> None:
         """Free what the graphics driver holds. Harmless when repeated."""
         self._canvas.close()
+
+    def _add(self, camera: Camera, *pictures: NDArray[np.generic]) -> None:
+        self._hash.update(f"{camera.mount.body} {camera.spec.name} {self._step}".encode())
+        for picture in pictures:
+            self._hash.update(np.ascontiguousarray(picture).data)
 
     def _turn_to(self, camera: Camera) -> tuple[float, float]:
         """Have the world as it is now between the clipping planes [m] of a camera; return those."""
@@ -134,6 +174,16 @@ class Eyes:
         view.type = mujoco.mjtCamera.mjCAMERA_FIXED
         view.fixedcamid = self.model.camera(f"camera {number}").id
         return view
+
+
+def _words(spec: CameraSpec) -> str:
+    return f"camera '{spec.name}', {spec.lens.width} x {spec.lens.height} at {spec.rate_hz:g} Hz"
+
+
+@cache
+def _tell(line: str) -> None:
+    """Tell once in a process, not to /rosout: who looks changes no run."""
+    _LOG.warning(line)
 
 
 def _metres(nearness: NDArray[np.float32], near: float, far: float) -> NDArray[np.float32]:
