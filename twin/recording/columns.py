@@ -121,7 +121,7 @@ def _arrow(values: Any, kind: pa.DataType) -> pa.Array:
         return pa.Array.from_buffers(kind, len(items) // kind.list_size, [None], children=[items])
     if pa.types.is_list(kind):
         n, offsets = _offsets([len(value) for value in values])
-        items = _arrow(np.concatenate(values), kind.value_type)
+        items = _arrow(np.concatenate(values) if n else (), kind.value_type)
         return pa.Array.from_buffers(kind, n, [None, offsets], children=[items])
     return pa.array(values, kind)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 
+_CAMERA = "twin.camera"
 _LEVELS = {logging.WARNING: "WARN", logging.CRITICAL: "FATAL"}
 
 
@@ -30,8 +31,11 @@ def show_log() -> None:
 
 
 def show_warnings() -> None:
-    """Print what nodes warn of from now on, without the wall time: for a run, which has its own."""
-    _show(ConsoleLog(logging.WARNING, times=False))
+    """Print what nodes warn of, and who draws for cameras; without wall times, as a run has its own."""
+    handler = ConsoleLog(logging.INFO, times=False)
+    handler.addFilter(lambda record: record.levelno >= logging.WARNING or record.name == _CAMERA)
+    logging.getLogger(_CAMERA).setLevel(logging.INFO)
+    _show(handler)
 
 
 def _show(handler: ConsoleLog) -> None:

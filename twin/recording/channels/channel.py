@@ -45,6 +45,8 @@ class Context:
     """At its multiples [ns] pictures are kept; None: at no time."""
     pictures: set[str] = field(default_factory=set)
     """Topics of what cameras see in colours."""
+    seen_from: dict[str, str] = field(default_factory=dict)
+    """By topic of pictures: the frame that their messages name."""
     hung: set[str] = field(default_factory=set)
     """Those whose pictures hang in space, before their camera."""
     grids: dict[str, GridChannel] = field(default_factory=dict)

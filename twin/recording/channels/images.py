@@ -57,6 +57,7 @@ class ImageChannel(Channel[tuple[int, rr.Image | rr.DepthImage]]):
             self.rows.append((sample.time_ns, image))
             if isinstance(image, rr.Image):
                 self.context.pictures.add(self.topic)
+                self.context.seen_from[self.topic] = sample.message.header.frame_id
 
     def chunks(self, rows: list[tuple[int, rr.Image | rr.DepthImage]]) -> Iterator[Chunk]:
         """Yield the images."""

@@ -27,6 +27,11 @@ def picture_entity(topic: str) -> str:
     return f"/cameras{topic}"
 
 
+def image_frame(topic: str) -> str:
+    """Return the recording's name of the plane of pictures that hang in space."""
+    return f"image of {topic}"
+
+
 class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
     """sensor_msgs/CompressedImage: JPEG and PNG, at the recording's own rate; no packed depths."""
 
@@ -43,6 +48,7 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
     def take(self, sample: Sample[Any]) -> None:
         """Keep a picture that is due."""
         period, message = self.context.images_period, sample.message
+        self.context.seen_from[self.topic] = message.header.frame_id
         packed = "compressedDepth" in message.format
         kind = next((kind for kind in ("jpeg", "png") if kind in message.format and not packed), None)
         if period is None or kind is None or sample.time_ns < self._next_ns:
@@ -88,9 +94,9 @@ def hang(context: Context, topic: str, frame: str, k: ArrayLike, size: tuple[int
             image_from_camera=k,
             resolution=size,
             parent_frame=frame,
-            child_frame=f"image of {topic}",
+            child_frame=image_frame(topic),
             image_plane_distance=_PLANE_M,
         ),
-        rr.CoordinateFrame(f"image of {topic}"),
+        rr.CoordinateFrame(image_frame(topic)),
         static=True,
     )

@@ -183,7 +183,7 @@ def _words(spec: CameraSpec) -> str:
 @cache
 def _tell(line: str) -> None:
     """Tell once in a process, not to /rosout: who looks changes no run."""
-    _LOG.warning(line)
+    _LOG.info(line)
 
 
 def _metres(nearness: NDArray[np.float32], near: float, far: float) -> NDArray[np.float32]:

@@ -1,0 +1,103 @@
+"""What was found in pictures: outlines with their names, over the picture in which it was found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from twin.bridge.msgs import ns
+from twin.periods import next_due
+from twin.recording.channels.channel import Channel
+from twin.recording.channels.pictures import image_frame, picture_entity
+from twin.recording.columns import Chunk, Component, sim_time
+
+if TYPE_CHECKING:
+    from twin.bridge.topics import Sample
+
+_COLOUR = (60, 230, 90, 255)
+_STRIPS, _LABELS = (Component(rr.LineStrips2D, name) for name in ("strips", "labels"))
+
+
+class Found(NamedTuple):
+    """What is shown of a message."""
+
+    time_ns: int
+    picture: str
+    """Topic of the picture."""
+    outlines: tuple[NDArray[np.float32], ...]
+    """Closed, each of shape (n, 2) [pixels]."""
+    names: tuple[str, ...]
+
+
+class DetectionChannel(Channel[Found]):
+    """A message about a picture of a camera of the same robot, at the rate of the recording's pictures."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._next_ns = 0
+        self._declared: set[str] = set()
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Keep what was found in a picture that is kept."""
+        message, period = sample.message, self.context.images_period
+        stamp_ns = ns(message.header.stamp)
+        if period is None or stamp_ns < self._next_ns:
+            return
+        self._next_ns = next_due(period, stamp_ns)
+        found = [self.outline(each) for each in message.detections]
+        outlines = tuple(np.concatenate((points, points[:1])).astype(np.float32) for points, _ in found)
+        names = tuple(name for _, name in found)
+        for topic, frame in self.context.seen_from.items():
+            if frame == message.header.frame_id and self.context.frames.split(topic)[0] == self.namespace:
+                self.rows.append(Found(sample.time_ns, topic, outlines, names))
+
+    def outline(self, detection: Any) -> tuple[NDArray[np.float64], str]:
+        """Return corners of what was found, shape (n, 2) [pixels], and what it is called."""
+        raise NotImplementedError
+
+    def chunks(self, rows: list[Found]) -> Iterator[Chunk]:
+        """Yield the outlines, camera by camera."""
+        for topic in sorted({row.picture for row in rows}):
+            seen = [row for row in rows if row.picture == topic]
+            entity = f"{picture_entity(topic)}{self.topic}"
+            if topic not in self._declared:
+                self._declared.add(topic)
+                look = rr.LineStrips2D.from_fields(
+                    colors=[_COLOUR], radii=rr.Radius.ui_points(1.5), show_labels=True
+                )
+                self.recording.log(entity, look, static=True)
+                if topic in self.context.hung:
+                    self.recording.log(entity, rr.CoordinateFrame(image_frame(topic)), static=True)
+            lengths = [len(row.outlines) for row in seen]
+            columns = (
+                _STRIPS.column([outline for row in seen for outline in row.outlines], lengths),
+                _LABELS.column([name for row in seen for name in row.names], lengths),
+            )
+            yield entity, sim_time([row.time_ns for row in seen]), columns
+
+
+class TagChannel(DetectionChannel):
+    """apriltag_msgs/AprilTagDetectionArray: borders of tags."""
+
+    def outline(self, detection: Any) -> tuple[NDArray[np.float64], str]:
+        """Return the corners of a tag, and its family and id."""
+        corners = np.array([(corner.x, corner.y) for corner in detection.corners])
+        return corners, f"{detection.family}:{detection.id}"
+
+
+class BoxChannel(DetectionChannel):
+    """vision_msgs/Detection2DArray: boxes around what is seen."""
+
+    def outline(self, detection: Any) -> tuple[NDArray[np.float64], str]:
+        """Return the corners of a box, and what is likeliest in it."""
+        box, results = detection.bbox, detection.results
+        at, turn = box.center.position, box.center.theta
+        half = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * (box.size_x, box.size_y) / 2.0
+        turned = half @ np.array([(np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))])
+        likeliest = max(results, key=lambda result: result.hypothesis.score, default=None)
+        kind = "" if likeliest is None else likeliest.hypothesis.class_id
+        return np.add(turned, (at.x, at.y)), detection.id or kind
