@@ -61,7 +61,9 @@ class LivoxLidar(CloudLidar):
             )
         )
         if samples % 1 or not 1 <= samples <= MAX_RAYS:
-            add_fault(report, element, f" has {samples:g} samples; valid is a whole number from 1 to {MAX_RAYS}")
+            add_fault(
+                report, element, f" has {samples:g} samples; valid is a whole number from 1 to {MAX_RAYS}"
+            )
             samples = 1.0
         if downsample % 1 or not 1 <= downsample <= samples:
             valid = f"a whole number from 1 to the number of samples, {samples:g}"

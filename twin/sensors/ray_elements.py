@@ -77,7 +77,9 @@ def read_method(element: Element, report: Report, usual: M, *others: M) -> M:
     for method in valid:
         if text == method:
             return method
-    add_fault(report, element, f" has <method>{text}</method>; valid is {', '.join(valid[:-1])} or {valid[-1]}")
+    add_fault(
+        report, element, f" has <method>{text}</method>; valid is {', '.join(valid[:-1])} or {valid[-1]}"
+    )
     return usual
 
 

@@ -85,7 +85,7 @@ class Spinning:
         swing = np.modf(shots * (self.swings_hz / rate_hz))[0] * _TURN
         reach = (self.highest - self.lowest - (self.lines - 1) * self.spacing) / 2.0
         elevation = (self.lowest + self.highest) / 2.0 + reach * np.cos(swing)
-        return _unit(azimuth, elevation + line * self.spacing * np.cos(azimuth))
+        return _unit(azimuth, elevation + line * self.spacing * np.sin(azimuth))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,9 @@ def read_table(path: Path) -> Table:
     except ValueError:
         first = next(number for number, line in enumerate(lines) if not _is_row(line))
     if first >= 0:
-        raise ValueError(f"has '{lines[first][:40]}' in line {first + 2}; valid are three numbers: time, azimuth, zenith")
+        raise ValueError(
+            f"has '{lines[first][:40]}' in line {first + 2}; valid are three numbers: time, azimuth, zenith"
+        )
     azimuth, zenith = np.radians(values[:, 1:]).T
     return Table(_unit(azimuth, math.pi / 2.0 - zenith))
 
