@@ -1,7 +1,7 @@
 """What a cloud costs: CPU time of a VLP-16's turn over that of MuJoCo alone, and how exact the quick kind is.
 
-Rays at their own times are compared with `mj_multiRay` of the same groups, depth images with `mujoco.Renderer` of
-the same four. They take turns in one process, so that ratios hold on a noisy machine.
+Rays at their own times are compared with `mj_multiRay` of the same groups, depth images with those of
+`mujoco.Renderer`. They take turns in one process, so that ratios hold on a noisy machine.
 """
 
 from __future__ import annotations

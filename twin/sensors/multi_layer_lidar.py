@@ -72,7 +72,7 @@ class MultiLayerLidarSpec(CloudLidarSpec):
 
 
 class MultiLayerLidar(CloudLidar):
-    """Casts columns of rays group by group while it turns, or takes all from four depth images at one time."""
+    """Casts columns of rays group by group while it turns, or takes all from four depth images."""
 
     @classmethod
     def asks_for_cloud(cls, element: Element) -> bool:
@@ -167,6 +167,6 @@ def _check_images(spec: MultiLayerLidarSpec, element: Element, report: Report) -
         add_fault(
             report,
             element,
-            f" needs depth images of {width} x {height} pixels; valid are at most {MOST_PIXELS} each way: larger "
-            "steps, layers that are less steep, or <method>instant</method>",
+            f" needs depth images of {width} x {height} pixels; valid are at most {MOST_PIXELS} each way: "
+            "larger steps, layers that are less steep, or <method>instant</method>",
         )

@@ -39,6 +39,7 @@ FATES = MappingProxyType(
         "sonar/min": ELSEWHERE,
         "sonar/radius": RAYS,
         "plugin/fov": RAYS,
+        "method": ELSEWHERE,
         "noise/stddev": NOISE,
         "plugin/gaussianNoise": NOISE,
     }

@@ -13,7 +13,7 @@ _GROUPS_HZ = 250.0
 
 
 def groups_of(rate_hz: float, most: int) -> int:
-    """Return the number of parts of a turn, at most `most`, of a lidar that turns `rate_hz` times a second."""
+    """Return the number of parts of a turn, at most `most`, if there are `rate_hz` turns a second."""
     return max(1, min(_GROUPS, most, int(_GROUPS_HZ / rate_hz)))
 
 

@@ -28,12 +28,15 @@ def robot(tmp_path: Path, sensor: str) -> RobotDescription:
 
 def livox(tmp_path: Path, words: str, more: str = "") -> RobotDescription:
     ray = f"<ray><range><min>0.1</min><max>70</max></range>{more}</ray>"
-    plugin = f"<plugin filename='liblivox_laser_simulation.so'>{ray}{words}<ros_topic>/livox/lidar</ros_topic></plugin>"
+    topic = "<ros_topic>/livox/lidar</ros_topic>"
+    plugin = f"<plugin filename='liblivox_laser_simulation.so'>{ray}{words}{topic}</plugin>"
     return robot(tmp_path, f"<sensor name='livox' type='ray'><update_rate>10</update_rate>{plugin}</sensor>")
 
 
 def scanner(tmp_path: Path, method: str, layers: str = "") -> RobotDescription:
-    scan = "<horizontal><samples>360</samples><min_angle>-3.1</min_angle><max_angle>3.1</max_angle></horizontal>"
+    scan = (
+        "<horizontal><samples>360</samples><min_angle>-3.1</min_angle><max_angle>3.1</max_angle></horizontal>"
+    )
     ray = f"<scan>{scan}{layers}</scan><range><min>0.3</min><max>30</max></range><method>{method}</method>"
     return robot(tmp_path, f"<sensor name='lidar' type='gpu_lidar'><lidar>{ray}</lidar></sensor>")
 
@@ -105,8 +108,16 @@ def test_depth_images_have_pixels_no_wider_than_a_step_and_hold_all_layers(tmp_p
         ("lidar", "", r"has <method>lidar</method>; valid is instant or rolling"),
         ("depth_images", "", r"has <method>depth_images</method>; valid is instant or rolling"),
         ("", LAYERS, r"has <method></method>; valid is instant, rolling or depth_images"),
-        ("depth_images", LAYERS.replace("0.26<", "1.57<"), r"needs depth images of 116 x \d+ pixels; valid are"),
-        ("depth_images", LAYERS.replace("0.26<", "3.0<"), r"needs depth images of 116 x \d+ pixels; valid are"),
+        (
+            "depth_images",
+            LAYERS.replace("0.26<", "1.57<"),
+            r"needs depth images of 116 x \d+ pixels; valid are",
+        ),
+        (
+            "depth_images",
+            LAYERS.replace("0.26<", "3.0<"),
+            r"needs depth images of 116 x \d+ pixels; valid are",
+        ),
         ("depth_images", LAYERS.replace("0.26<", "0.0001<"), r"needs depth images of \d+ x \d+ pixels"),
     ],
 )

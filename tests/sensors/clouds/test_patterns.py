@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +98,6 @@ def test_a_file_s_rows_come_in_turns_over_and_over_again(tmp_path: Path) -> None
 def test_a_file_that_is_no_pattern_is_told(text: str, said: str, tmp_path: Path) -> None:
     file = tmp_path / "own.csv"
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError) as caught:
+    with pytest.raises(ValueError, match=re.escape(said)) as caught:
         read_table(file)
-    assert str(caught.value).startswith(said)
     assert len(str(caught.value)) < 120

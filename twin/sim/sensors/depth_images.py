@@ -139,8 +139,8 @@ class DepthImages:
             eyes = Eyes(self._mount.world, self._mount.world.spec_to_see(), self._cameras)
         except SimulationError as fault:
             raise SimulationError(
-                f"lidar '{self._name}' of robot '{self._mount.robot}' looks at depth images: {fault}; without "
-                "them: <method>instant</method>"
+                f"lidar '{self._name}' of robot '{self._mount.robot}' looks at depth images: {fault}; "
+                "without them: <method>instant</method>"
             ) from fault
         model = eyes.model
         own = model.body(self._mount.body).id
