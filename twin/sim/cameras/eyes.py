@@ -92,6 +92,7 @@ class Eyes:
             SimulationError: The process is a fork of the one that opened the canvas.
         """
         near, far = self._turn_to(camera)
+        self.drawn += 1
         groups, before = self._options.geomgroup, self._options.geomgroup.copy()
         groups[GROUP_VISUAL], groups[GROUP_COLLISION] = 0, 1
         self._update(camera, paint=False)
