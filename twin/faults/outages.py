@@ -19,8 +19,8 @@ from twin.faults.readings import ReadingConfig, ReadingFault
 from twin.geometry import Array
 from twin.parameters import Fraction, Positive, Seconds, Share
 from twin.scenario.faults import LastingRobotFault
+from twin.sensors.clouds.cloud_lidar import CloudLidar
 from twin.sensors.lidar import Lidar
-from twin.sensors.multi_layer_lidar import MultiLayerLidar
 
 
 class Dropout(ReadingFault):
@@ -136,7 +136,7 @@ class Delay(ReadingFault):
 class LidarFailure(Freeze):
     """A lidar delivers nothing, or nothing of use."""
 
-    devices = Lidar, MultiLayerLidar
+    devices = Lidar, CloudLidar
 
     @dataclass(frozen=True, kw_only=True)
     class Config(LastingRobotFault):

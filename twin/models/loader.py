@@ -104,7 +104,7 @@ def parse_urdf(
     _check_version(root, report)
     colour_visuals(root)
     surfaces = read_surfaces(root, report)
-    packages = Packages(PackagePath.of(source, options))
+    report.packages = packages = Packages(PackagePath.of(source, options))
     links = _read_links(root, surfaces, packages, report, options)
     joints, elements = _read_joints(root, report)
     joints = without_idle_mimics(joints, elements, report)

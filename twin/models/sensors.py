@@ -14,6 +14,7 @@ SENSORS: Kind[Any] = Kind("sensor", base="twin.sensors:Sensor", group="twin.sens
 for _name in ("gpu_lidar", "lidar", "ray", "gpu_ray"):
     SENSORS.register(_name, "twin.sensors.lidar:Lidar")
 SENSORS.register("multi_layer_lidar", "twin.sensors.multi_layer_lidar:MultiLayerLidar")
+SENSORS.register("livox_lidar", "twin.sensors.livox_lidar:LivoxLidar")
 for _name in ("sonar", "ray-cone"):
     SENSORS.register(_name, "twin.sensors.range:Range")
 SENSORS.register("imu", "twin.sensors.imu:Imu")

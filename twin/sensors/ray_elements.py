@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from types import MappingProxyType
+from typing import TypeVar
 
 import mujoco
 
@@ -14,8 +15,10 @@ from twin.models.specs import SensorSpec
 from twin.models.urdf.document import Element, Report, first
 from twin.models.urdf.sensors import add_fault, deviation, required_number
 
-RAY = ("lidar", "ray")
-"""The element with <scan> and <range>: new and classic name."""
+M = TypeVar("M", bound=str)
+
+RAY = ("lidar", "ray", "plugin/ray")
+"""The element with <scan> and <range>: new and classic name, and that of Livox's plugin."""
 RAY_ALONG_X = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
 """A rangefinder looks along its site's z axis; this turns it to the sensor's x axis."""
 MAX_RAYS = 2048
@@ -36,6 +39,7 @@ FATES = MappingProxyType(
         "sonar/min": ELSEWHERE,
         "sonar/radius": RAYS,
         "plugin/fov": RAYS,
+        "method": ELSEWHERE,
         "noise/stddev": NOISE,
         "plugin/gaussianNoise": NOISE,
     }
@@ -63,6 +67,21 @@ def read_noise(element: Element, report: Report) -> float:
     """Return the standard deviation of a range [m]."""
     paths = (*(f"{ray}/noise/stddev" for ray in RAY), "plugin/gaussianNoise")
     return deviation(element, report, *paths) or 0.0
+
+
+def read_method(element: Element, report: Report, usual: M, *others: M) -> M:
+    """Return how a lidar measures, `<method>` in `<ray>`: an element of ours, which Gazebo ignores."""
+    found = ray_child(element, "method")
+    if found is None:
+        return usual
+    text, valid = (found.text or "").strip(), (usual, *others)
+    for method in valid:
+        if text == method:
+            return method
+    add_fault(
+        report, element, f" has <method>{text}</method>; valid is {', '.join(valid[:-1])} or {valid[-1]}"
+    )
+    return usual
 
 
 def add_rangefinders(

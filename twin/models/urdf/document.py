@@ -14,6 +14,7 @@ from lxml import etree
 from twin.errors import ModelError, Problem
 from twin.models.shapes import SkippedMesh
 from twin.models.urdf.line_table import LineTable
+from twin.models.urdf.packages import Packages
 from twin.models.urdf.plain_numbers import plain_number, plain_numbers
 from twin.models.urdf.xml_text import scan
 from twin.plain_text import UNSEEN
@@ -40,6 +41,8 @@ class Report:
     source: Path
     table: LineTable | None = None
     """Of a text that xacro wrote; otherwise the text's lines are those of `source`."""
+    packages: Packages | None = None
+    """What its text may name files of; the loader tells."""
     problems: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
     """What the robot can be used without."""

@@ -27,6 +27,7 @@ TOPIC_TAGS = (
     "plugin/bumperTopicName",
     "plugin/imageTopicName",
     "plugin/topic",
+    "plugin/ros_topic",
     "topicName",
 )
 RATE_TAGS = ("update_rate", "plugin/updateRateHZ", "plugin/updateRate", "updateRate")

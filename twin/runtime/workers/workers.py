@@ -64,7 +64,7 @@ class Workers:
         """CPU time of the workers at the last observation [s]."""
         for worker, stack in ((w, s) for w, share in zip(self._workers, shares, strict=True) for s in share):
             for number, sensor in enumerate(stack.sensors):
-                if type(sensor.sensor) is Lidar:
+                if type(sensor.sensor) is Lidar and sensor.sensor.spec.method == "instant":
                     sensor.sensor = Scanned(sensor.sensor)
                     self._scanned[id(sensor)] = worker, (stack.name, number)
             told = Told(stack.robot_pose, self._beliefs, stack.name)

@@ -17,7 +17,7 @@ from twin.convert.sensors import add_camera
 from twin.errors import SimulationError
 from twin.models.specs import CameraSpec
 from twin.sim.canvas import Canvas
-from twin.sim.compose import GROUP_PAINT
+from twin.sim.compose import GROUP_COLLISION, GROUP_PAINT, GROUP_VISUAL
 
 if TYPE_CHECKING:
     from twin.sim.cameras.camera import Camera
@@ -108,6 +108,27 @@ class Eyes:
             distances = _metres(self._canvas.nearness(self._scene, *size), near, far)
         self._add(camera, seen, distances)
         return seen, distances
+
+    def look_for_rays(self, camera: Camera, nearness: NDArray[np.float32]) -> None:
+        """Find 1 / z [1/m] of what rays would hit, which are collision shapes; 0 where they hit nothing.
+
+        Args:
+            camera: Of these eyes.
+            nearness: Where it goes, shape (height, width).
+
+        Raises:
+            SimulationError: The process is a fork of the one that opened the canvas.
+        """
+        near, far = self._turn_to(camera)
+        self.drawn += 1
+        groups, before = self._options.geomgroup, self._options.geomgroup.copy()
+        groups[GROUP_VISUAL], groups[GROUP_COLLISION] = 0, 1
+        self._update(camera, paint=False)
+        groups[:] = before
+        drawn = self._canvas.nearness(self._scene, *camera.source.size)
+        # OpenGL's depth is linear in 1 / z: 1 at `near`, and 0 at `far`.
+        np.multiply(drawn, 1.0 / near - 1.0 / far, out=nearness)
+        np.add(nearness, 1.0 / far, out=nearness, where=drawn > 0.0)
 
     def geoms(self, camera: Camera) -> NDArray[np.intp]:
         """Return the geom that each pixel of the source shows, shape (height, width); -1 where none is.

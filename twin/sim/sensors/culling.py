@@ -55,7 +55,7 @@ class RayBounds:
 
 
 class BodiesInReach:
-    """While entered, `mj_multiRay` skips the bodies that are out of reach, and those that a flat fan misses.
+    """While entered, `mj_multiRay` skips bodies out of reach, off the plane of a flat fan, beside a bundle.
 
     It does so by itself, but ray by ray: with many robots that is most of what a scan costs.
     """
@@ -78,6 +78,8 @@ class BodiesInReach:
             savings: What is not done over again.
         """
         self._normal = _normal(directions)
+        self._sides: Array | None = None
+        self.aim(directions)
         self._geoms = np.flatnonzero(
             _are_seen(model, groups) & (model.geom_bodyid > 0) & savings.plane_of_rays
         )
@@ -89,6 +91,10 @@ class BodiesInReach:
         self._all = self._counts[self._bodies]
         self._now = self._all
 
+    def aim(self, directions: Array) -> None:
+        """Take other rays, which fill no plane."""
+        self._sides = None if self._normal is not None else _sides(directions)
+
     def look(self, data: mujoco.MjData, body: int) -> None:
         """Find what the rays of a link `body` may hit at present."""
         if not len(self._geoms):
@@ -97,6 +103,9 @@ class BodiesInReach:
         hit = np.einsum("ij,ij->i", away, away) <= self._reach**2
         if self._normal is not None:
             hit &= np.abs(away @ (data.xmat[body].reshape(3, 3) @ self._normal)) <= self._radius + _FLAT_M
+        if self._sides is not None:
+            inward = away @ (data.xmat[body].reshape(3, 3) @ self._sides.T)
+            hit &= inward.min(axis=1) >= -self._radius - _SLACK_M
         self._now = np.where(np.logical_or.reduceat(hit, self._first), self._all, 0)
 
     def __enter__(self) -> None:
@@ -163,6 +172,8 @@ class FanSlice(_Scenery):
 
     def look(self, data: mujoco.MjData, body: int) -> None:
         """Find what the plane of the fan, whose link is `body`, meets at present."""
+        if not len(self._geoms):
+            return
         normal = data.xmat[body].reshape(3, 3) @ self._normal
         height = float(data.xpos[body] @ normal)
         turned = math.dist(normal, self._plane[0])
@@ -186,11 +197,16 @@ class PyramidSlice(_Scenery):
         """Bind to a model; as `FanSlice`, but where rays fill a plane, or go apart too far, all is seen."""
         sides = _sides(directions) if _normal(directions) is None else None
         super().__init__(model, groups, sides is not None and savings.plane_of_rays)
-        self._sides = np.zeros((0, 3)) if sides is None else sides
+        self._sides = sides
+
+    def aim(self, directions: Array) -> None:
+        """Take other rays, which may fill a plane or go apart as they like."""
+        self._sides = _sides(directions) if len(self._geoms) else None
 
     def look(self, data: mujoco.MjData, body: int) -> None:
         """Find what the pyramid of the rays of a link `body` holds at present."""
-        if not len(self._geoms):
+        if self._sides is None or not len(self._geoms):
+            self._now = self._shown
             return
         sides = self._sides @ data.xmat[body].reshape(3, 3).T
         inside = (self._centre - data.xpos[body]) @ sides.T + self._half @ np.abs(sides).T

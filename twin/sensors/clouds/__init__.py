@@ -1,0 +1,1 @@
+"""What lidars that make clouds have in common."""
