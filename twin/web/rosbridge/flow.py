@@ -84,3 +84,15 @@ class Flow:
         size = min(sizes, default=None)
         for piece in in_fragments(frame, size, next(_numbers)) if size else (frame,):
             self._send(piece)
+
+
+class Watch(Flow):
+    """A topic for who is no client of the protocol: each message as it came."""
+
+    def __init__(self, take: Callable[[Heard], None]) -> None:
+        super().__init__(lambda frame: None, lambda told: None)
+        self.wanted[None] = Wanted()
+        self._take = take
+
+    def _pass(self, heard: Heard) -> None:
+        self._take(heard)

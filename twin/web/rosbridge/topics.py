@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from twin.bridge.topics import Publisher
 from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.bridge.topics.raw_publisher import Presence
 from twin.errors import BridgeError
-from twin.web.rosbridge.flow import Flow, Wanted
+from twin.web.rosbridge.flow import Flow, Wanted, Watch
 from twin.web.rosbridge.frames import Heard
 from twin.web.rosbridge.learner import Learner, type_name
 from twin.web.rosbridge.values import to_message
@@ -48,7 +48,7 @@ class Source:
         learner: Learner,
         now_s: Callable[[], float],
     ) -> None:
-        self.flows: dict[Session, Flow] = {}
+        self.flows: dict[Hashable, Flow] = {}
         self._graph, self._topic, self._learner, self._now_s = graph, topic, learner, now_s
         self._codecs: dict[tuple[str, str], Codec[Any] | None] = {}
         self._retained: OrderedDict[bytes, deque[Heard]] = OrderedDict()
@@ -61,9 +61,9 @@ class Source:
             self._endpoints.append(Presence(node, "MS", topic, typename, types.rihs01(typename), qos))
         self._endpoints.append(RawSubscription(node, topic, self._on_sample, qos))
 
-    def join(self, session: Session, flow: Flow) -> None:
-        """Let a client hear the topic, first what was latched."""
-        self.flows[session] = flow
+    def join(self, who: Hashable, flow: Flow) -> None:
+        """Let somebody hear the topic, first what was latched."""
+        self.flows[who] = flow
         for kept in self._retained.values():
             for heard in kept:
                 flow.offer(heard, self._now_s())
@@ -138,10 +138,7 @@ class Topics:
         topic = self._node.resolve_name(name)
         expected = None if given is None else type_name(given, "msg")
         self._check(topic, expected)
-        source = self._sources.get(topic)
-        if source is None:
-            source = Source(self._node, self._graph, topic, expected, self._learner, self._now_s)
-            self._sources[topic] = source
+        source = self._source(topic, expected)
         flow = source.flows.get(session)
         is_new = flow is None
         if flow is None:
@@ -164,9 +161,24 @@ class Topics:
             flow.wanted.clear()
         flow.wanted.pop(key, None)
         if not flow.wanted:
-            del source.flows[session]
-        if not source.flows:
+            self.unwatch(session, topic)
+
+    def watch(self, who: Hashable, topic: str, take: Callable[[Heard], None]) -> None:
+        """Let somebody who is no client hear a topic, by its absolute name, message by message."""
+        self._source(topic, None).join(who, Watch(take))
+
+    def unwatch(self, who: Hashable, topic: str) -> None:
+        """End what somebody hears of a topic; a topic that nobody hears any more is left."""
+        source = self._sources.get(topic)
+        if source is not None and source.flows.pop(who, None) is not None and not source.flows:
             self._sources.pop(topic).destroy()
+
+    def _source(self, topic: str, expected: str | None) -> Source:
+        if topic not in self._sources:
+            self._sources[topic] = Source(
+                self._node, self._graph, topic, expected, self._learner, self._now_s
+            )
+        return self._sources[topic]
 
     def count(self, session: Session) -> int:
         """Return how many topics a client hears and publishes."""

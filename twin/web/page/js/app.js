@@ -1,6 +1,7 @@
 /** The operator's page: what stands where. */
 
 import { html, render, useEffect, useReducer, useRef, useState } from "ui";
+import { Camera } from "./camera.js";
 import { Drive } from "./drive.js";
 import { MapCanvas } from "./map.js";
 import { Rosbridge } from "./rosbridge.js";
@@ -121,11 +122,6 @@ function Alarms({ station, t }) {
 function Log({ station, t }) {
   if (!station.log.length) return html`<p class="muted">${t("noLog")}</p>`;
   return html`<ol class="log">${station.log.map((line) => html`<li key=${line.key} class=${line.level}><time>${clock(line.time)}</time> <b>${line.source}</b> ${line.text}</li>`)}</ol>`;
-}
-
-function Camera({ station, t }) {
-  if (!station.cameras.size) return html`<p class="muted">${t("noCamera")}</p>`;
-  return [...station.cameras].map(([topic, url]) => html`<figure><img class="camera" src=${url} alt=${topic} /><figcaption class="muted">${topic}</figcaption></figure>`);
 }
 
 /** A component of a module that is loaded when it is first shown: three and uPlot are large. */

@@ -44,7 +44,6 @@ export class Station extends EventTarget {
     this.control = null; // twin_msgs/Control, and own id
     this.queue = []; // {id, x, y, yaw, state: waiting | active | succeeded | canceled | failed, left}
     this.holding = false;
-    this.cameras = new Map(); // topic -> data URL
     this._goals = 0;
     this._heard = new Set();
     ros.addEventListener("connection", () => this._connection());
@@ -55,6 +54,12 @@ export class Station extends EventTarget {
 
   get robot() {
     return this.robots.get(this.selected);
+  }
+
+  /** Where something is on the server of the page; the token goes with it. */
+  address(path, query) {
+    const token = new URLSearchParams(location.search).get("token");
+    return `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
   }
 
   select(space) {
@@ -183,8 +188,6 @@ export class Station extends EventTarget {
     else if (type === "geometry_msgs/msg/PoseArray" && last === "people") owned((robot, msg) => (robot.people = msg), 200);
     else if (type === "geometry_msgs/msg/PoseWithCovarianceStamped" && last === "amcl_pose")
       owned((robot, msg) => (robot.spread = Math.sqrt(Math.max(0, msg.pose.covariance[0] + msg.pose.covariance[7]))), 200);
-    else if (type === "sensor_msgs/msg/CompressedImage")
-      hear((msg) => this.cameras.set(topic, `data:image/${/png/.test(msg.format) ? "png" : "jpeg"};base64,${msg.data}`), 200);
     else if (type === "diagnostic_msgs/msg/DiagnosticArray" && topic.endsWith("guard/status"))
       owned((robot, msg) => this._guard(robot, msg));
     else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, s.level > 0)));
