@@ -163,9 +163,11 @@ class Topics:
         if not flow.wanted:
             self.unwatch(session, topic)
 
-    def watch(self, who: Hashable, topic: str, take: Callable[[Heard], None]) -> None:
+    def watch(
+        self, who: Hashable, topic: str, take: Callable[[Heard], None], expected: str | None = None
+    ) -> None:
         """Let somebody who is no client hear a topic, by its absolute name, message by message."""
-        self._source(topic, None).join(who, Watch(take))
+        self._source(topic, expected).join(who, Watch(take))
 
     def unwatch(self, who: Hashable, topic: str) -> None:
         """End what somebody hears of a topic; a topic that nobody hears any more is left."""

@@ -1,9 +1,11 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
+import { TiledGrid, WholeGrid } from "./grids.js";
 import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
 
 const GRAPH_MS = 3000;
 const LOG_LINES = 300;
+const ODOMETRY = "nav_msgs/msg/Odometry";
 const GRID = "nav_msgs/msg/OccupancyGrid";
 const LEVELS = { 10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal" };
 const GOAL = { name: "navigate_to_pose", type: "nav2_msgs/action/NavigateToPose" };
@@ -19,7 +21,7 @@ class Robot {
     this.frames = new Frames();
     this.base = "base_footprint";
     this.velocity = { linear: 0, angular: 0 };
-    this.grids = {}; // map, global, local -> {message, version}
+    this.grids = {}; // map, global, local, or a mask's topic -> a grid of grids.js
     this.mission = []; // {state, time}
     this.trail = [];
   }
@@ -121,7 +123,8 @@ export class Station extends EventTarget {
       this.note("warn", "rosapi", error.message);
       return;
     }
-    for (const [topic, type] of this.types) this._hear(topic, type);
+    const robotsFirst = [...this.types].sort((a, b) => (b[1] === ODOMETRY) - (a[1] === ODOMETRY)); // what belongs to one finds it
+    for (const [topic, type] of robotsFirst) this._hear(topic, type);
     if (!this.robots.has(this.selected) && this.robots.size) this.selected = [...this.robots.keys()].sort()[0];
     this.changed();
   }
@@ -153,7 +156,7 @@ export class Station extends EventTarget {
       if (robot) callback(robot, msg);
     }, throttle);
 
-    if (type === "nav_msgs/msg/Odometry" && last === "odom") {
+    if (type === ODOMETRY && last === "odom") {
       const robot = this._robot(space);
       hear((msg) => {
         robot.base = msg.child_frame_id;
@@ -164,13 +167,7 @@ export class Station extends EventTarget {
       hear((msg) => this._robotsIn(space).forEach((robot) => robot.frames.take(msg)), 0);
     else if (type === GRID) {
       const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask/.test(last) ? "zones" : "";
-      if (kind) {
-        const take = (robot, message) => (robot.grids[kind] = { message, version: (robot.grids[kind]?.version ?? 0) + 1 });
-        owned(take, kind === "map" ? 0 : 500);
-      }
-    } else if (type === "map_msgs/msg/OccupancyGridUpdate") {
-      const kind = topic.includes("global_costmap") ? "global" : topic.includes("local_costmap") ? "local" : "map";
-      owned((robot, msg) => patch(robot.grids[kind], msg));
+      if (kind) this._grid(topic, kind);
     } else if (type === "sensor_msgs/msg/LaserScan" && last === "scan") owned(takeScan, 150);
     else if (type === "nav_msgs/msg/Path" && last === "plan") owned((robot, msg) => (robot.plan = msg), 200);
     else if (type === "geometry_msgs/msg/PolygonStamped" && topic.endsWith("local_costmap/published_footprint"))
@@ -199,6 +196,30 @@ export class Station extends EventTarget {
       });
     else if (topic === "/clock") hear((msg) => this._time(msg.clock), 500);
     else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
+  }
+
+  /** Show a grid: in tiles if there are some; the local costmap, small and always another, whole. */
+  async _grid(topic, kind) {
+    this._heard.add(topic);
+    try {
+      const tiled = kind === "local" ? null : await TiledGrid.open(this, topic, kind);
+      if (tiled) this._owner(topic).grids[kind === "zones" ? topic : kind] = tiled; // there may be several masks
+      else this._wholeGrid(topic, kind);
+    } catch {
+      this._heard.delete(topic); // not now: it is looked again
+    }
+    this.changed();
+  }
+
+  _wholeGrid(topic, kind) {
+    const grid = new WholeGrid(kind);
+    this.ros.subscribe(topic, GRID, (message) => {
+      const robot = this._owner(topic);
+      grid.take(message);
+      if (robot) robot.grids[kind === "zones" ? topic : kind] = grid;
+      this.changed();
+    }, kind === "map" ? 0 : 500);
+    this.ros.subscribe(`${topic}_updates`, "map_msgs/msg/OccupancyGridUpdate", (update) => grid.patch(update));
   }
 
   _robotsIn(space) {
@@ -363,12 +384,4 @@ function takeScan(robot, scan) {
     points.push(place(pose, [range * Math.cos(angle), range * Math.sin(angle), 0]));
   });
   robot.scan = points;
-}
-
-function patch(grid, { x, y, width, height, data }) {
-  if (!grid || x + width > grid.message.info.width || y + height > grid.message.info.height) return;
-  for (let row = 0; row < height; row++)
-    for (let column = 0; column < width; column++)
-      grid.message.data[(y + row) * grid.message.info.width + x + column] = data[row * width + column];
-  grid.version += 1;
 }

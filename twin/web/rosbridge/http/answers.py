@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Callable
 from http import HTTPStatus
 from typing import TYPE_CHECKING
@@ -12,9 +13,11 @@ from twin.errors import BridgeError
 from twin.web.rosbridge.access import Role
 from twin.web.rosbridge.bridge import Limits
 from twin.web.rosbridge.door import Door, given_token, peer_of
-from twin.web.rosbridge.http.cameras import Camera
-from twin.web.rosbridge.http.jpeg import Wish
-from twin.web.rosbridge.http.look import Ask
+from twin.web.rosbridge.frames import to_json
+from twin.web.rosbridge.http.cameras import Camera, EndedError
+from twin.web.rosbridge.http.jpeg import NoPictureError, Wish
+from twin.web.rosbridge.http.look import Ask, NoTopicError
+from twin.web.rosbridge.http.maps import Maps
 from twin.web.rosbridge.pages import Page, policy_of, refusal
 from twin.web.rosbridge.rates import Bucket
 
@@ -24,7 +27,9 @@ if TYPE_CHECKING:
 
     from twin.web.rosbridge.server import ServerConfig
 
-_STREAM, _SNAPSHOT = "/stream", "/snapshot"
+_STREAM, _SNAPSHOT, _TILES = "/stream", "/snapshot", "/tiles.json"
+_TILE = re.compile(r"/tiles/(\d{1,2})/(\d{1,6})/(\d{1,6})\.png")
+_VERSION = re.compile(r"\d{1,18}")
 _KINDS = ("mjpeg", "ros_compressed")
 _MOST_PEERS = 10_000
 
@@ -38,31 +43,45 @@ class Http:
         self.streams: set[ServerConnection] = set()
         self._config, self._limits, self._door, self._ask = config, limits, door, ask
         self._connected = connected
+        self._maps = Maps(ask)
         self._rates: dict[str, Bucket] = {}
 
     async def answer(self, connection: ServerConnection, request: Request) -> Page | None:
         """Return the answer to a GET; None: it is not for what is served here."""
         url = urlsplit(request.path)
-        if url.path not in (_STREAM, _SNAPSHOT):
+        tile = _TILE.fullmatch(url.path)
+        if url.path not in (_STREAM, _SNAPSHOT, _TILES) and tile is None:
             return None
         role = self._role(connection, request)
         if isinstance(role, Page):
             return role
         query = dict(parse_qsl(url.query, keep_blank_values=True))
         topic = f"/{query.get('topic', '').strip('/')}"
-        try:
-            if topic == "/":
-                raise BridgeError(f"{url.path} needs ?topic=, the name of a topic")
-            kind = query.get("type", "mjpeg")
-            if kind not in _KINDS:
-                raise BridgeError(f"the type {kind[:40]!r} is not known; valid: {', '.join(_KINDS)}")
-            topic = f"{topic}/compressed" if kind == "ros_compressed" else topic
-            camera = Camera(self._ask, topic, Wish.of(query), self._limits.stalled_s)
-        except BridgeError as error:
-            return refusal(400, str(error))
+        kind = query.get("type", _KINDS[0])
+        if topic == "/":
+            return refusal(400, f"{url.path} needs ?topic=, the name of a topic")
+        if kind not in _KINDS:
+            return refusal(400, f"the type {kind[:40]!r} is not known; valid: {', '.join(_KINDS)}")
+        topic = f"{topic}/compressed" if kind == "ros_compressed" else topic
         if not role.allows("heard topic", topic):
             return refusal(403, f"the topic {topic} is not for the role {role.name}")
-        return await (camera.snapshot() if url.path == _SNAPSHOT else self._stream(connection, camera))
+        try:
+            if tile is not None:
+                z, x, y = map(int, tile.groups())
+                return await self._tile(topic, (z, x, y), request.headers.get("If-None-Match"))
+            if url.path == _TILES:
+                return await self._described(topic, query.get("since"))
+            camera = Camera(self._ask, topic, Wish.of(query))
+            if url.path == _STREAM:
+                return await self._stream(connection, camera)
+            async with asyncio.timeout(self._limits.stalled_s):
+                return await camera.snapshot()
+        except TimeoutError:
+            return refusal(504, f"nothing came from {topic} in {self._limits.stalled_s:g} s")
+        except NoTopicError as error:
+            return refusal(404, str(error))
+        except BridgeError as error:
+            return refusal(415 if isinstance(error, NoPictureError) else 400, str(error))
 
     def close(self) -> None:
         """End all streams."""
@@ -85,7 +104,25 @@ class Http:
         token = None if given is None else self._door.checked(peer, given)
         return refusal(401, "a token is needed, one that is known") if token is None else token.role
 
-    async def _stream(self, connection: ServerConnection, camera: Camera) -> Page | None:
+    async def _described(self, topic: str, since: str | None) -> Page:
+        tiles = await self._maps.tiles(topic, self._limits.stalled_s)
+        known = int(since) if since is not None and _VERSION.fullmatch(since) else None
+        return Page(200, "application/json", to_json(tiles.describe(known)).encode())
+
+    async def _tile(self, topic: str, at: tuple[int, int, int], known: str | None) -> Page:
+        tiles = await self._maps.tiles(topic, self._limits.stalled_s)
+        made = await asyncio.to_thread(tiles.png, *at)
+        if made is None:
+            return refusal(404, f"{topic} has no tile z, x, y = {at[0]}, {at[1]}, {at[2]}")
+        version, file = made
+        tag = f'"{version}"'
+        return (
+            Page(304, "image/png", b"", (("ETag", tag),))
+            if known == tag
+            else Page(200, "image/png", file, (("ETag", tag),))
+        )
+
+    async def _stream(self, connection: ServerConnection, camera: Camera) -> Page:
         if self._connected() + len(self.streams) >= self._limits.clients:
             return refusal(503, "too many clients")
 
@@ -95,21 +132,21 @@ class Http:
             return answer.serialize()
 
         self.streams.add(connection)
-        work = asyncio.ensure_future(camera.stream(connection, begin))
+        work = asyncio.ensure_future(camera.stream(connection, begin, self._limits.stalled_s))
         gone = asyncio.ensure_future(connection.wait_closed())
         try:
             await asyncio.wait((work, gone), return_when=asyncio.FIRST_COMPLETED)
-            page = work.result() if work.done() else None
-        except TimeoutError:  # it reads nothing
-            page = None
+            if work.done():
+                work.result()
+        except EndedError:
+            pass
         finally:
             self.streams.discard(connection)
             work.cancel()
             gone.cancel()
-        if page is None:
-            connection.transport.abort()
-            await connection.wait_closed()
-        return page or refusal(410, "it has gone")
+        connection.transport.abort()
+        await connection.wait_closed()
+        return refusal(410, "it has gone")  # nobody reads it
 
 
 def response(page: Page) -> Response:

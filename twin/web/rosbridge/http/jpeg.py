@@ -21,6 +21,10 @@ _RAW = {
 """Pillow's mode, the order of a pixel's bytes, and how many they are, by encoding."""
 
 
+class NoPictureError(BridgeError):
+    """A message that cannot be shown."""
+
+
 @dataclass(frozen=True)
 class Wish:
     """How a client wants pictures: quality 1 to 100, size in pixels; None: as they are."""
@@ -47,7 +51,7 @@ def jpeg_of(message: Any, wish: Wish) -> bytes:
     """Return an Image or a CompressedImage as a JPEG file; one that is as it is wished for stays as it is.
 
     Raises:
-        BridgeError: no picture that can be shown.
+        NoPictureError: no picture that can be shown.
     """
     from PIL import Image as Pillow
 
@@ -59,14 +63,14 @@ def jpeg_of(message: Any, wish: Wish) -> bytes:
             picture: Any = Pillow.open(BytesIO(data), formats=("JPEG", "PNG", "WEBP"))
         else:
             if message.encoding not in _RAW:
-                raise BridgeError(f"{message.encoding[:40]!r} is not shown; valid: {', '.join(_RAW)}")
+                raise NoPictureError(f"{message.encoding[:40]!r} is not shown; valid: {', '.join(_RAW)}")
             mode, order, size = _RAW[message.encoding]
             if message.step < message.width * size or len(message.data) < message.step * message.height:
-                raise BridgeError("the picture has fewer bytes than it says")
+                raise NoPictureError("the picture has fewer bytes than it says")
             shape = (message.width, message.height)
             picture = Pillow.frombuffer(mode, shape, message.data.tobytes(), "raw", order, message.step, 1)
         if not 0 < picture.width * picture.height <= _MOST_PIXELS:
-            raise BridgeError(f"a picture of {picture.width} x {picture.height} pixels is not shown")
+            raise NoPictureError(f"a picture of {picture.width} x {picture.height} pixels is not shown")
         if wish.width or wish.height:
             aspect = picture.width / picture.height
             width = wish.width or max(1, round((wish.height or 1) * aspect))
@@ -76,7 +80,7 @@ def jpeg_of(message: Any, wish: Wish) -> bytes:
             file, "jpeg", quality=wish.quality or _QUALITY
         )
     except (OSError, ValueError, Pillow.DecompressionBombError) as error:
-        raise BridgeError(f"the picture cannot be shown: {error}") from None
+        raise NoPictureError(f"the picture cannot be shown: {error}") from None
     return file.getvalue()
 
 

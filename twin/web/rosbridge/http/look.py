@@ -51,15 +51,9 @@ class Look:
         self._ask(lambda bridge: bridge.topics.unwatch(self, self._topic))
 
     def _begin(self, bridge: Bridge) -> None:
-        try:
-            found = bridge.topics.type_of(self._topic)
-        except BridgeError as error:  # no name of a topic
-            self._tell(None, str(error))
-            return
-        if found is None:
-            self._tell(None, f"nobody publishes {self._topic}")
-        elif found not in self._types:
-            self._tell(None, f"{self._topic} is a {found}, not a {' or '.join(self._types)}")
+        fault = fault_of(bridge, self._topic, self._types)
+        if fault:
+            self._tell(None, fault)
         else:
             bridge.topics.watch(self, self._topic, partial(self._tell, fault=None))
 
@@ -69,3 +63,14 @@ class Look:
             self._loop.call_soon_threadsafe(self._filled.set)
         except RuntimeError:
             return  # the server has ended
+
+
+def fault_of(bridge: Bridge, topic: str, types: Collection[str]) -> str:
+    """Return why a topic is not one of some types, empty if it is."""
+    try:
+        found = bridge.topics.type_of(topic)
+    except BridgeError as error:  # no name of a topic
+        return str(error)
+    if found is None:
+        return f"nobody publishes {topic}"
+    return "" if found in types else f"{topic} is a {found}, not a {' or '.join(types)}"
