@@ -24,6 +24,7 @@ _READING = (
     "/rosapi/*", "/twin/control", "*/get_parameters", "*/get_parameter_types", "*/list_parameters",
     "*/describe_parameters", "*/get_type_description", "*/get_state", "*/get_available_*", "*/get_map",
     "*/get_costmap", "*/get_cost", "*/map_server/map", "*/is_path_valid", "*/tf2_frames", "/republish_tfs",
+    "*/get_shapes",
 )  # fmt: skip
 _CHANGING = ("/rosapi/set_param", "/rosapi/delete_param")
 _OPERATING = (
@@ -31,6 +32,7 @@ _OPERATING = (
     "*/set_initial_pose", "*/toggle", "/clear", "/reset", "/spawn", "/kill",
     "*/teleport_absolute", "*/teleport_relative", "*/set_pen",
     "*/add_task", "*/cancel_task", "*/pause", "*/resume", "*/_action/cancel_goal", "*/acknowledge*",
+    "*/add_shapes", "*/remove_shapes",
 )  # fmt: skip
 _TALKING = (
     "*/cmd_vel*", "*/teleop", "*/initialpose", "*/goal_pose", "*/clicked_point", "*/joy", "*/waypoints",
@@ -50,7 +52,7 @@ STEERING_TOPICS = (
 STEERING_SERVICES = (
     "*/guard/release", "*/reinitialize_global_localization", "*/set_initial_pose", "*/toggle",
     "*/teleport_absolute", "*/teleport_relative", "*/add_task", "*/cancel_task", "*/pause", "*/resume",
-    "*/_action/send_goal", "*/_action/cancel_goal",
+    "*/_action/send_goal", "*/_action/cancel_goal", "*/add_shapes", "*/remove_shapes",
 )  # fmt: skip
 """Services by which a robot is steered; those of other programs need a role, and no control."""
 

@@ -8,6 +8,7 @@ import { Rosbridge } from "./rosbridge.js";
 import { Station } from "./station.js";
 import { yawOf } from "./transforms.js";
 import { wordsOf } from "./words.js";
+import { ZoneBar, Zones, ZonesPanel } from "./zones.js";
 
 const SILENT_S = 2;
 const kept = (key, otherwise) => localStorage.getItem(`twin.${key}`) ?? otherwise;
@@ -131,7 +132,7 @@ function Lazy({ load, ...props }) {
   return loaded && html`<${loaded} ...${props} />`;
 }
 
-const PANELS = { drive: Drive, tasks: Tasks, alarms: Alarms, log: Log, plot: (props) => html`<${Lazy} load=${() => import("./plot.js").then((m) => m.Plot)} ...${props} />`, camera: Camera };
+const PANELS = { drive: Drive, tasks: Tasks, zones: ZonesPanel, alarms: Alarms, log: Log, plot: (props) => html`<${Lazy} load=${() => import("./plot.js").then((m) => m.Plot)} ...${props} />`, camera: Camera };
 
 function Panels({ station, t, panel, setPanel }) {
   const Panel = PANELS[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
@@ -153,6 +154,7 @@ function Stage({ station, t }) {
   const [layers, setLayers] = useState({ costmap: true, scan: true, plan: true, zones: true });
   const view = useRef();
   const set = (x, y, yaw) => {
+    if (tool === "zone") return station.zones.click(x, y);
     if (tool === "pose") station.estimate(x, y, yaw);
     else station.add(x, y, yaw, { now: tool === "goal" });
     if (tool !== "waypoint") setTool("pan");
@@ -164,8 +166,9 @@ function Stage({ station, t }) {
       : html`<${Lazy} load=${() => import("./scene.js").then((m) => m.Scene)} station=${station} label=${t("sceneLabel")} />`}
     <div class="bar top" role="toolbar" aria-label=${t("tools")}>
       ${toggle("view3d", mode === "3d", () => setMode(mode === "map" ? "3d" : "map"))}
-      ${mode === "map" && ["goal", "waypoint", "pose"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
+      ${mode === "map" && ["goal", "waypoint", "pose", "zone"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
     ${mode === "map" && hints[tool] && html`<div class="hint" role="status">${t(hints[tool])}</div>`}
+    ${mode === "map" && tool === "zone" && html`<${ZoneBar} station=${station} t=${t} done=${() => setTool("pan")} />`}
     ${mode === "map" && html`<div class="bar bottom" role="toolbar" aria-label=${t("layers")}>
       <button class="icon" aria-label=${t("zoomOut")} onClick=${() => view.current.zoom(0.8)}>−</button><button class="icon" aria-label=${t("zoomIn")} onClick=${() => view.current.zoom(1.25)}>+</button>
       <button onClick=${() => { setFollow(false); view.current.fit(); }}>${t("fit")}</button>${toggle("follow", follow, () => setFollow(!follow))}
@@ -191,5 +194,6 @@ const token = new URLSearchParams(location.search).get("token");
 const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/${token ? `?token=${encodeURIComponent(token)}` : ""}`;
 const station = new Station(new Rosbridge(url), kept("name", `page ${Math.floor(Math.random() * 900 + 100)}`));
 keep("name", station.name);
+station.zones = new Zones(station);
 station.ros.addEventListener("connection", () => station.ros.connected && station.take(""));
 render(html`<${App} station=${station} />`, document.getElementById("app"));

@@ -136,6 +136,7 @@ export class MapView {
       c.lineWidth = 2.5;
       this._line(c, robot.plan.poses.map(({ pose }) => [pose.position.x, pose.position.y]));
     }
+    if (this.layers.zones) station.zones.draw(this, c, colour);
     this._things(c, robot, robot.goods, 0.15, colour("goods"));
     this._things(c, robot, robot.people, 0.25, colour("people"));
     station.queue.filter((goal) => goal.state === "active" || goal.state === "waiting").forEach((goal, i) => this._flag(c, [goal.x, goal.y], goal.yaw, colour("accent"), goal.state === "active" ? "" : String(i + 1)));

@@ -166,7 +166,7 @@ export class Station extends EventTarget {
     } else if (type === "tf2_msgs/msg/TFMessage" && (last === "tf" || last === "tf_static"))
       hear((msg) => this._robotsIn(space).forEach((robot) => robot.frames.take(msg)), 0);
     else if (type === GRID) {
-      const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask/.test(last) ? "zones" : "";
+      const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask|^vo_map$/.test(last) ? "zones" : "";
       if (kind) this._grid(topic, kind);
     } else if (type === "sensor_msgs/msg/LaserScan" && last === "scan") owned(takeScan, 150);
     else if (type === "nav_msgs/msg/Path" && last === "plan") owned((robot, msg) => (robot.plan = msg), 200);
