@@ -19,6 +19,7 @@ from twin.bridge.topics.raw_publisher import Presence
 from twin.errors import BridgeError
 from twin.web.rosbridge.flow import Flow, Wanted, Watch
 from twin.web.rosbridge.frames import Heard
+from twin.web.rosbridge.history import History
 from twin.web.rosbridge.learner import Learner, type_name
 from twin.web.rosbridge.values import to_message
 
@@ -47,15 +48,20 @@ class Source:
         given: str | None,
         learner: Learner,
         now_s: Callable[[], float],
+        history: History | None,
     ) -> None:
+        self._history = history if history is not None and history.has(topic) else None
         self.flows: dict[Hashable, Flow] = {}
         self._graph, self._topic, self._learner, self._now_s = graph, topic, learner, now_s
         self._codecs: dict[tuple[str, str], Codec[Any] | None] = {}
         self._retained: OrderedDict[bytes, deque[Heard]] = OrderedDict()
+        self._endpoints: list[Presence | RawSubscription] = []
+        if self._history is not None:
+            self._history.hear(topic, self._on_sample)
+            return
         publishers = graph.publishers(topic)
         latched = not publishers or any(p.qos.durability == "transient_local" for p in publishers)
         qos = QoS(depth=_DEPTH, durability="transient_local" if latched else "volatile")
-        self._endpoints: list[Presence | RawSubscription] = []
         typename = publishers[0].type if publishers else given
         if typename is not None and is_known(typename):
             self._endpoints.append(Presence(node, "MS", topic, typename, types.rihs01(typename), qos))
@@ -64,18 +70,24 @@ class Source:
     def join(self, who: Hashable, flow: Flow) -> None:
         """Let somebody hear the topic, first what was latched."""
         self.flows[who] = flow
+        if self._history is not None:
+            for sample in self._history.state([self._topic]):
+                flow.offer(Heard(sample, self._codec(sample)), self._now_s())
         for kept in self._retained.values():
             for heard in kept:
                 flow.offer(heard, self._now_s())
 
     def destroy(self) -> None:
         """Hear nothing any more."""
+        if self._history is not None:
+            self._history.leave(self._topic)
         for endpoint in self._endpoints:
             endpoint.node.destroy_subscription(endpoint)  # type: ignore[arg-type]
 
     def _on_sample(self, sample: RawSample) -> None:
         heard = Heard(sample, self._codec(sample))
-        self._retain(sample, heard)
+        if self._history is None:
+            self._retain(sample, heard)
         for flow in tuple(self.flows.values()):
             flow.offer(heard, self._now_s())
 
@@ -115,8 +127,18 @@ class _Outlet:
 class Topics:
     """All that clients hear and publish."""
 
-    def __init__(self, node: Node, graph: Graph, learner: Learner, now_s: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        graph: Graph,
+        learner: Learner,
+        now_s: Callable[[], float],
+        history: History | None = None,
+    ) -> None:
         self._node, self._graph, self._learner, self._now_s = node, graph, learner, now_s
+        self._history = history
+        if history is not None:
+            history.on_jump(self._forget)
         self._sources: dict[str, Source] = {}
         self._outlets: dict[str, _Outlet] = {}
 
@@ -164,10 +186,28 @@ class Topics:
             self.unwatch(session, topic)
 
     def watch(
-        self, who: Hashable, topic: str, take: Callable[[Heard], None], expected: str | None = None
+        self,
+        who: Hashable,
+        topic: str,
+        take: Callable[[Heard], None],
+        expected: str | None = None,
+        forget: Callable[[], None] = lambda: None,
     ) -> None:
-        """Let somebody who is no client hear a topic, by its absolute name, message by message."""
-        self._source(topic, expected).join(who, Watch(take))
+        """Let somebody who is no client hear a topic, by its absolute name, message by message.
+
+        Args:
+            who: To end it by.
+            topic: Its name.
+            take: Takes a message.
+            expected: Type, if nobody tells it yet.
+            forget: Called when what was heard is over: a bag goes to another time.
+        """
+        self._source(topic, expected).join(who, Watch(take, forget))
+
+    def _forget(self) -> None:
+        for source in self._sources.values():
+            for flow in source.flows.values():
+                flow.forget()
 
     def unwatch(self, who: Hashable, topic: str) -> None:
         """End what somebody hears of a topic; a topic that nobody hears any more is left."""
@@ -178,7 +218,7 @@ class Topics:
     def _source(self, topic: str, expected: str | None) -> Source:
         if topic not in self._sources:
             self._sources[topic] = Source(
-                self._node, self._graph, topic, expected, self._learner, self._now_s
+                self._node, self._graph, topic, expected, self._learner, self._now_s, self._history
             )
         return self._sources[topic]
 

@@ -3,6 +3,7 @@
 import { html, render, useEffect, useReducer, useRef, useState } from "ui";
 import { Camera } from "./camera.js";
 import { Drive } from "./drive.js";
+import { HistoryBar, Mission } from "./history.js";
 import { MapCanvas } from "./map.js";
 import { Rosbridge } from "./rosbridge.js";
 import { Station } from "./station.js";
@@ -37,7 +38,7 @@ function EmergencyStop({ station, t }) {
 
 function Control({ station, t }) {
   const control = station.control;
-  if (!control) return null;
+  if (!control || station.history) return null;
   const mine = control.holder && control.holder_id === control.own;
   const words = mine ? t("controlMine") : control.holder ? `${control.holder} ${t("controlOther")}` : t("controlNone");
   const command = mine ? "release" : control.holder ? "take_over" : "take";
@@ -62,7 +63,7 @@ function Header({ station, t, theme, setTheme, language, setLanguage }) {
       <div class="wide"><${Control} station=${station} t=${t} /></div>
       <button class="plain" id="language" lang=${language === "en" ? "zh" : "en"} onClick=${() => setLanguage(language === "en" ? "zh" : "en")}>${t("language")}</button>
       <button class="plain" id="theme" aria-label=${t("theme")} title=${t("theme")} onClick=${() => setTheme(theme === "dark" ? "light" : "dark")}>${theme === "dark" ? "☀" : "☾"}</button>
-      <${EmergencyStop} station=${station} t=${t} />
+      ${!station.history && html`<${EmergencyStop} station=${station} t=${t} />`}
     </header>`;
 }
 
@@ -134,9 +135,16 @@ function Lazy({ load, ...props }) {
 
 const PANELS = { drive: Drive, tasks: Tasks, zones: ZonesPanel, alarms: Alarms, log: Log, plot: (props) => html`<${Lazy} load=${() => import("./plot.js").then((m) => m.Plot)} ...${props} />`, camera: Camera };
 
-function Panels({ station, t, panel, setPanel }) {
-  const Panel = PANELS[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
-  const names = Object.keys(PANELS);
+/** What there is to see, and, now, to do. */
+function panelsOf(station) {
+  const { drive, tasks, zones, ...rest } = PANELS;
+  return station.history ? { mission: Mission, ...rest } : PANELS;
+}
+
+function Panels({ station, t, panel: chosen, setPanel }) {
+  const panels = panelsOf(station), panel = panels[chosen] ? chosen : Object.keys(panels)[0];
+  const Panel = panels[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
+  const names = Object.keys(panels);
   const turn = (event) => {
     const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!by) return;
@@ -166,7 +174,7 @@ function Stage({ station, t }) {
       : html`<${Lazy} load=${() => import("./scene.js").then((m) => m.Scene)} station=${station} label=${t("sceneLabel")} />`}
     <div class="bar top" role="toolbar" aria-label=${t("tools")}>
       ${toggle("view3d", mode === "3d", () => setMode(mode === "map" ? "3d" : "map"))}
-      ${mode === "map" && ["goal", "waypoint", "pose", "zone"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
+      ${mode === "map" && !station.history && ["goal", "waypoint", "pose", "zone"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
     ${mode === "map" && hints[tool] && html`<div class="hint" role="status">${t(hints[tool])}</div>`}
     ${mode === "map" && tool === "zone" && html`<${ZoneBar} station=${station} t=${t} done=${() => setTool("pan")} />`}
     ${mode === "map" && html`<div class="bar bottom" role="toolbar" aria-label=${t("layers")}>
@@ -186,7 +194,7 @@ function App({ station }) {
   useEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
   const t = wordsOf(language), props = { station, t };
   return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} />
-    <${Banner} ...${props} />
+    <${Banner} ...${props} /><${HistoryBar} ...${props} />
     <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }
 

@@ -1,5 +1,6 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
+import { HISTORY, takeHistory } from "./history.js";
 import { TiledGrid, WholeGrid } from "./grids.js";
 import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
 
@@ -18,12 +19,18 @@ class Robot {
   constructor(space) {
     this.space = space;
     this.name = space.slice(1) || "robot";
-    this.frames = new Frames();
     this.base = "base_footprint";
-    this.velocity = { linear: 0, angular: 0 };
     this.grids = {}; // map, global, local, or a mask's topic -> a grid of grids.js
+    this.forget();
+  }
+
+  /** Know nothing of what was said of now: a bag goes to another time. */
+  forget() {
+    this.frames = new Frames();
+    this.velocity = { linear: 0, angular: 0 };
     this.mission = []; // {state, time}
-    this.trail = [];
+    for (const name of ["scan", "plan", "goods", "people", "footprint", "battery", "spread", "joints", "guard"]) this[name] = undefined;
+    for (const [key, grid] of Object.entries(this.grids)) if (grid instanceof WholeGrid) delete this.grids[key];
   }
 
   /** {root, pose} of the base. */
@@ -62,6 +69,13 @@ export class Station extends EventTarget {
   address(path, query) {
     const token = new URLSearchParams(location.search).get("token");
     return `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
+  }
+
+  forget() {
+    this.robots.forEach((robot) => robot.forget());
+    this.log = [];
+    this.alarms.clear();
+    this.changed();
   }
 
   select(space) {
@@ -194,7 +208,8 @@ export class Station extends EventTarget {
         this.note(level, msg.name, msg.msg, msg.stamp.sec + msg.stamp.nanosec * 1e-9);
         if (msg.level >= 40) this.alarm(`log ${msg.name}`, "error", `${msg.name}: ${msg.msg}`);
       });
-    else if (topic === "/clock") hear((msg) => this._time(msg.clock), 500);
+    else if (topic === "/clock") hear((msg) => this.history || this._time(msg.clock), 500);
+    else if (type === HISTORY) hear((msg) => takeHistory(this, msg));
     else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
   }
 

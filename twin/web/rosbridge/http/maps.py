@@ -42,7 +42,7 @@ class Map:
             self._tell()
             return
         bridge.topics.watch(self, f"{self._topic}_updates", self._on_update, UPDATE)
-        bridge.topics.watch(self, self._topic, self._on_grid, GRID)
+        bridge.topics.watch(self, self._topic, self._on_grid, GRID, self.tiles.forget)
 
     def _end(self, bridge: Bridge) -> None:
         for topic in (self._topic, f"{self._topic}_updates"):

@@ -65,6 +65,12 @@ class Tiles:
             if self._message is not None:
                 self._lay(update)
 
+    def forget(self) -> None:
+        """Know nothing of any cell."""
+        with self._lock:
+            self._update = None
+            self._change(0, 0, np.full_like(self._cells, _UNKNOWN))
+
     def describe(self, since: int | None = None) -> dict[str, Any]:
         """Return what the grid is, and which tiles of the greatest z are newer than a version.
 
