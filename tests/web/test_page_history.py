@@ -72,7 +72,6 @@ def test_the_page_shows_a_bag_as_it_was_and_commands_nothing(address: str) -> No
         assert "a wheel slips" in page.inner_text("ol.log")
         page.click("#tab-alarms")
         assert page.locator("li.alarm").count() == 1
-        page.screenshot(path="/tmp/history_desktop.png")
 
         slide(page, 20.0)  # back
         eventually(lambda: position(page) == (2.0, 1.5), "the robot is where it was before")
@@ -100,4 +99,3 @@ def test_the_page_shows_a_bag_as_it_was_and_commands_nothing(address: str) -> No
             page.click("#language")
         page.set_viewport_size({"width": 360, "height": 740})
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
-        page.screenshot(path="/tmp/history_phone.png", full_page=True)

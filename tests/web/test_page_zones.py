@@ -52,7 +52,6 @@ def test_a_zone_is_drawn_listed_kept_and_removed() -> None:
         page.wait_for_selector("#zone-list li")
         assert "4 corners" in page.inner_text("#zone-list")
         assert page.locator("#zone-add").count() == 0, "drawn, the tool is put away"
-        page.screenshot(path="/tmp/zones_desktop.png")
 
         # It lives at the robot's side: the page may go.
         page.reload()
@@ -94,7 +93,6 @@ def test_a_zone_is_drawn_listed_kept_and_removed() -> None:
         page.click("#tool-zone")
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
         assert violations(page) == []
-        page.screenshot(path="/tmp/zones_phone.png", full_page=True)
 
 
 @pytest.mark.long
