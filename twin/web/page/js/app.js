@@ -1,6 +1,7 @@
 /** The operator's page: what stands where. */
 
 import { html, render, useEffect, useReducer, useRef, useState } from "ui";
+import { ZoneBar, Zones, ZonesPanel } from "./zones.js";
 import { Camera } from "./camera.js";
 import { Drive } from "./drive.js";
 import { HistoryBar, Mission } from "./history.js";
@@ -9,7 +10,6 @@ import { Rosbridge } from "./rosbridge.js";
 import { Station } from "./station.js";
 import { yawOf } from "./transforms.js";
 import { wordsOf } from "./words.js";
-import { ZoneBar, Zones, ZonesPanel } from "./zones.js";
 
 const SILENT_S = 2;
 const kept = (key, otherwise) => localStorage.getItem(`twin.${key}`) ?? otherwise;
@@ -193,8 +193,8 @@ function App({ station }) {
   useEffect(() => { document.documentElement.lang = language; keep("language", language); }, [language]);
   useEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
   const t = wordsOf(language), props = { station, t };
-  return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} />
-    <${Banner} ...${props} /><${HistoryBar} ...${props} />
+  return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
+    <${Banner} ...${props} />
     <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }
 

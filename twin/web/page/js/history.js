@@ -45,7 +45,7 @@ export function HistoryBar({ station, t }) {
   const day = start > 1e8 && new Date((start + now) * 1000).toLocaleString(document.documentElement.lang);
   return html`<section class="history" aria-label=${t("past")}>
     <strong class="badge">${t("past")}</strong>
-    <button id="play" class="icon" aria-label=${t(state.paused ? "play" : "pause_")} onClick=${() => call(state.paused ? "resume" : "pause", state.paused ? "Resume" : "Pause")}>${state.paused ? "▶" : "❚❚"}</button>
+    <button id="play" class="icon" aria-label=${t(state.paused ? "playBag" : "pauseBag")} onClick=${() => call(state.paused ? "resume" : "pause", state.paused ? "Resume" : "Pause")}>${state.paused ? "▶" : "❚❚"}</button>
     <input id="time" type="range" min="0" max=${length} step=${STEP_S} value=${now} aria-label=${t("pastTime")} aria-valuetext=${`${clock(now)} / ${clock(length)}`} onInput=${slide} />
     <output id="past-now">${clock(now)} / ${clock(length)}${day && html` <span class="muted wide">${day}</span>`}</output>
     <select id="rate" aria-label=${t("pace")} value=${state.rate} onChange=${(event) => call("set_rate", "SetRate", { rate: Number(event.target.value) })}>

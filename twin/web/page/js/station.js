@@ -1,8 +1,8 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
-import { HISTORY, takeHistory } from "./history.js";
-import { TiledGrid, WholeGrid } from "./grids.js";
 import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
+import { TiledGrid, WholeGrid } from "./grids.js";
+import { HISTORY, takeHistory } from "./history.js";
 
 const GRAPH_MS = 3000;
 const LOG_LINES = 300;
@@ -186,6 +186,7 @@ export class Station extends EventTarget {
     else if (type === "nav_msgs/msg/Path" && last === "plan") owned((robot, msg) => (robot.plan = msg), 200);
     else if (type === "geometry_msgs/msg/PolygonStamped" && topic.endsWith("local_costmap/published_footprint"))
       owned((robot, msg) => (robot.footprint = msg), 200);
+    else if (type === HISTORY) hear((msg) => takeHistory(this, msg));
     else if (type === "sensor_msgs/msg/BatteryState") owned((robot, msg) => (robot.battery = msg), 1000);
     else if (type === "sensor_msgs/msg/JointState" && last === "joint_states")
       owned((robot, msg) => (robot.joints = msg), 100);
@@ -208,8 +209,7 @@ export class Station extends EventTarget {
         this.note(level, msg.name, msg.msg, msg.stamp.sec + msg.stamp.nanosec * 1e-9);
         if (msg.level >= 40) this.alarm(`log ${msg.name}`, "error", `${msg.name}: ${msg.msg}`);
       });
-    else if (topic === "/clock") hear((msg) => this.history || this._time(msg.clock), 500);
-    else if (type === HISTORY) hear((msg) => takeHistory(this, msg));
+    else if (topic === "/clock") hear((msg) => this._time(msg.clock), 500);
     else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
   }
 
@@ -242,6 +242,7 @@ export class Station extends EventTarget {
   }
 
   _time({ sec, nanosec }) {
+    if (this.history) return; // which has a time of its own
     const time = sec + nanosec * 1e-9, now = performance.now() / 1000;
     const { time: before, at } = this.clock;
     const factor = before !== null && now > at ? (time - before) / (now - at) : null;
