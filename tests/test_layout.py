@@ -73,6 +73,8 @@ WALL_CLOCK = {
         "monotonic",
         "time_ns",
     },  # time-outs of clients; when a command was given
+    "twin/web/rosbridge/door.py": {"monotonic"},
+    "twin/web/rosbridge/http/tiles.py": {"time_ns"},  # versions are others in another process
     "twin/web/rosbridge/server.py": {"monotonic"},  # rates and time limits of clients
     "twin/cli/ros/watch.py": {"monotonic"},  # how long is watched
     "twin/cli/run/folders.py": {"now"},  # the name of a run's folder

@@ -11,8 +11,6 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from tests.processes import wait_for
+from tests.web.serving import serving
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.live import LiveBus
@@ -38,40 +37,6 @@ HANDSHAKE = (
     b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
 SECRETS = "viewer-0123456789", "operator-0123456789"
-
-
-@contextmanager
-def serving(
-    config: ServerConfig,
-    limits: Limits | None = None,
-    nodes: Callable[[Bus], Any] = lambda bus: None,
-    audit: Callable[[str], None] = lambda line: None,
-) -> Iterator[Rosbridge]:
-    """A bridge on a bus of its own, run by a thread."""
-    made: list[Rosbridge] = []
-    ready, over = threading.Event(), threading.Event()
-
-    def run() -> None:
-        clock = Clock()
-        with Bus.open(clock) as bus:
-            process = LiveBus(bus, clock, use_sim_time=False)
-            rosbridge = Rosbridge(process, config, BridgeConfig(limits or Limits(), audit=audit))
-            nodes(bus)
-            made.append(rosbridge)
-            ready.set()
-            try:
-                rosbridge.spin(over.is_set)
-            finally:
-                rosbridge.close()
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        assert ready.wait(60.0)
-        yield made[0]
-    finally:
-        over.set()
-        thread.join(60.0)
 
 
 def ask(client: ClientConnection, **message: Any) -> dict[str, Any]:

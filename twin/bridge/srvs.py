@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from twin.bridge.types import ServiceType
 
+AddShapes = ServiceType("nav2_msgs/srv/AddShapes")
 AddTwoInts = ServiceType("example_interfaces/srv/AddTwoInts")
 CancelGoal = ServiceType("action_msgs/srv/CancelGoal")
 ClearCostmapAroundPose = ServiceType("nav2_msgs/srv/ClearCostmapAroundPose")
@@ -17,9 +18,11 @@ GetCostmap = ServiceType("nav2_msgs/srv/GetCostmap")
 GetMap = ServiceType("nav_msgs/srv/GetMap")
 GetParameterTypes = ServiceType("rcl_interfaces/srv/GetParameterTypes")
 GetParameters = ServiceType("rcl_interfaces/srv/GetParameters")
+GetShapes = ServiceType("nav2_msgs/srv/GetShapes")
 IsPathValid = ServiceType("nav2_msgs/srv/IsPathValid")
 ListParameters = ServiceType("rcl_interfaces/srv/ListParameters")
 LoadMap = ServiceType("nav2_msgs/srv/LoadMap")
+RemoveShapes = ServiceType("nav2_msgs/srv/RemoveShapes")
 SaveMap = ServiceType("nav2_msgs/srv/SaveMap")
 SetBool = ServiceType("std_srvs/srv/SetBool")
 SetInitialPose = ServiceType("nav2_msgs/srv/SetInitialPose")

@@ -77,7 +77,7 @@ def costmap(bench: Bench, robot: Robot, layers: CostmapConfig = LAYERS, **config
 def serve_mask(bench: Bench, kind: str, mask: OccupancyMap, **info: Any) -> MapServerNode:
     server = MapServerNode(bench.bus, mask, name=f"{kind}_mask_server", topic=f"{kind}_mask")
     config = CostmapFilterInfoConfig(filter_info_topic=f"{kind}_info", mask_topic=f"{kind}_mask", **info)
-    CostmapFilterInfoNode(bench.bus, config, name=f"{kind}_info_server")
+    CostmapFilterInfoNode(bench.bus, config, name=f"{kind}_info_server").announce()
     return server
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Self
 
@@ -65,6 +65,18 @@ class BagReader:
             raise self.no_topic(unknown[0])
         wanted = frozenset(self.topics if topics is None else topics)
         yield from self._source.messages(wanted, start_ns, end_ns)
+
+    def last(self, counts: Mapping[str, int], until_ns: int) -> list[BagMessage]:
+        """Return the last messages of topics up to a log time: what was known then.
+
+        Args:
+            counts: How many of each, by its name.
+            until_ns: Log time of the last [ns].
+
+        Raises:
+            RecordingError: the bag is no MCAP; it is damaged.
+        """
+        return self._source.last(counts, until_ns)
 
     def no_topic(self, name: str) -> RecordingError:
         """Return what to say of a topic that the bag does not have."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +31,14 @@ class Source(ABC):
     @abstractmethod
     def messages(self, topics: Collection[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
         """Yield the messages of topics, by log time from `start_ns` to `end_ns`, both inclusive."""
+
+    def last(self, counts: Mapping[str, int], until_ns: int) -> list[BagMessage]:
+        """Return the last messages of topics up to a log time, so many of each publisher, by log time.
+
+        Raises:
+            RecordingError: the bag has no index of times.
+        """
+        raise RecordingError("only bags of MCAP files tell what was at a time; twin bag convert makes one")
 
     def attachment(self, name: str) -> bytes | None:
         """Return a file within the bag, None if there is none of this name."""
@@ -61,6 +69,21 @@ class McapSource(Source):
             names = {c.id: c.topic for c in file.channels.values() if _usable(c) and c.topic in topics}
             for m in file.messages(names, start_ns, end_ns):
                 yield BagMessage(names[m.channel_id], m.data, m.log_time, m.publish_time, m.sequence)
+
+    def last(self, counts: Mapping[str, int], until_ns: int) -> list[BagMessage]:
+        """Look into the files from the last to the first; a topic is done with the first that has it."""
+        left, found = dict(counts), []
+        for file in reversed(self._files):
+            names = {c.id: c.topic for c in file.channels.values() if _usable(c) and c.topic in left}
+            messages = file.last({channel: left[name] for channel, name in names.items()}, until_ns)
+            found.append(
+                [
+                    BagMessage(names[m.channel_id], m.data, m.log_time, m.publish_time, m.sequence)
+                    for m in messages
+                ]
+            )
+            left = {name: n for name, n in left.items() if name not in {m.topic for m in found[-1]}}
+        return [message for each in reversed(found) for message in each]
 
     def attachment(self, name: str) -> bytes | None:
         """Return an attachment of the last file that has one of this name."""

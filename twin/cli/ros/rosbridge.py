@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -63,16 +64,27 @@ def rosbridge(
         float, typer.Option(metavar="HZ", min=1.0, help="Of messages from a client.")
     ] = 100.0,
     max_clients: Annotated[int, typer.Option(min=1, help="At a time.")] = 50,
+    bag: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="BAG", exists=True, help="Show what a bag holds, at any time of it, and join nobody."
+        ),
+    ] = None,
     parent: Annotated[int, typer.Option(hidden=True, help="End when this process does.")] = 0,
     *,
     joining: Joining,
 ) -> None:
     """Let web clients take part in a graph: rosbridge v2, and the operator's page, on one port."""
+    from twin.bridge.bags.reader import BagReader
+    from twin.bridge.bus import Bus
+    from twin.bridge.clock import Clock
+    from twin.bridge.live import LiveBus
     from twin.bridge.programs.console_log import show_log
     from twin.bridge.wire.interrupts import noted_signals
     from twin.web.rosbridge.access import ROLES, read_rules, read_tokens
     from twin.web.rosbridge.bridge import BridgeConfig, Limits
     from twin.web.rosbridge.control import ControlConfig
+    from twin.web.rosbridge.history import watching
     from twin.web.rosbridge.process import PAGE, Rosbridge, audit_file
     from twin.web.rosbridge.server import ServerConfig
 
@@ -80,6 +92,8 @@ def rosbridge(
         raise typer.BadParameter("--key is of a --certificate, which is not given")
     show_log()
     roles = read_rules(rules) if rules else ROLES
+    if bag is not None:
+        roles = {name: watching(role) for name, role in roles.items()}
     config = ServerConfig(
         address=address,
         port=port,
@@ -96,8 +110,18 @@ def rosbridge(
         ControlConfig(lease_s=lease, watchdog_s=watchdog),
         audit_file(audit),
     )
-    with joining.open(PATIENCE_S) as process, noted_signals() as received:
-        bridge = Rosbridge(process, config, bridging)
+    with ExitStack() as stack:
+        read = None
+        if bag is not None:
+            clock = Clock()
+            process = LiveBus(stack.enter_context(Bus.open(clock)), clock, use_sim_time=False)
+            read = stack.enter_context(BagReader(bag))
+            for notice in read.notices:
+                typer.echo(notice, err=True)
+        else:
+            process = stack.enter_context(joining.open(PATIENCE_S))
+        received = stack.enter_context(noted_signals())
+        bridge = Rosbridge(process, config, bridging, read)
         try:
             typer.echo(f"rosbridge listens on {bridge.server.address}; Ctrl-C ends it")
             bridge.spin(lambda: bool(received) or (parent > 0 and os.getppid() != parent))

@@ -20,9 +20,44 @@ SPEED_FILE = LOSSLESS_SCALE
 
 def empty_mask(occupancy: OccupancyMap) -> OccupancyMap:
     """Return a mask without zones, of the cells of a map."""
+    return filled(occupancy, FREE)
+
+
+def filled(occupancy: OccupancyMap, value: int) -> OccupancyMap:
+    """Return a map of the cells of another, all of one value."""
     return OccupancyMap(
-        data=np.full_like(occupancy.data, FREE), resolution=occupancy.resolution, origin=occupancy.origin
+        data=np.full_like(occupancy.data, value), resolution=occupancy.resolution, origin=occupancy.origin
     )
+
+
+def outline(polygon: ArrayLike) -> Array:
+    """Return the corners of a zone, shape (n, 2) [m], if they are in order around it.
+
+    Raises:
+        MapError: fewer than three corners, one that is no number, or edges that cross or touch.
+    """
+    corners = _corners(polygon)
+    ahead = np.roll(corners, -1, axis=0)
+    a, b = corners[:, None], ahead[:, None]  # of an edge in each row; c, d of one in each column
+    c, d = corners[None], ahead[None]
+    beside = (_side(a, b, c) * _side(a, b, d) <= 0.0) & (_side(c, d, a) * _side(c, d, b) <= 0.0)
+    low, high = np.minimum(corners, ahead), np.maximum(corners, ahead)
+    overlaps = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=-1)
+    count = len(corners)
+    apart = (np.arange(count)[:, None] - np.arange(count)[None]) % count
+    crossing = beside & overlaps & (apart > 1) & (apart < count - 1)
+    if crossing.any():
+        i, j = np.argwhere(crossing)[0].tolist()
+        raise MapError(
+            f"the edges {i + 1} and {j + 1} of the zone cross; valid are corners in order around it"
+        )
+    return corners
+
+
+def _side(a: Array, b: Array, c: Array) -> Array:
+    """Return on which side of the line from `a` to `b` points are: positive on the left."""
+    (ux, uy), (vx, vy) = np.moveaxis(b - a, -1, 0), np.moveaxis(c - a, -1, 0)
+    return np.asarray(ux * vy - uy * vx)
 
 
 def with_zone(mask: OccupancyMap, polygon: ArrayLike, value: int) -> OccupancyMap:
@@ -37,9 +72,7 @@ def with_zone(mask: OccupancyMap, polygon: ArrayLike, value: int) -> OccupancyMa
     Raises:
         MapError: no polygon, a value out of range, or no cell is inside.
     """
-    corners = np.asarray(polygon, dtype=np.float64)
-    if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
-        raise MapError("a zone needs three corners or more, each an x and a y in metres")
+    corners = _corners(polygon)
     if not FREE <= value <= OCCUPIED:
         raise MapError(f"a zone's value is {value}; valid is {FREE} to {OCCUPIED}")
     inside = _inside(mask, corners)
@@ -53,6 +86,13 @@ def with_zone(mask: OccupancyMap, polygon: ArrayLike, value: int) -> OccupancyMa
     data = mask.data.copy()
     data[inside] = value
     return OccupancyMap(data=data, resolution=mask.resolution, origin=mask.origin)
+
+
+def _corners(polygon: ArrayLike) -> Array:
+    corners = np.asarray(polygon, dtype=np.float64)
+    if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
+        raise MapError("a zone needs three corners or more, each an x and a y in metres")
+    return corners
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> Array:

@@ -9,6 +9,7 @@ from twin.navigation.costmaps.filters import KEEPOUT_FILTER, SPEED_FILTER_PERCEN
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.nodes.navigation.costmaps.config import CostmapNodeConfig
 from twin.nodes.navigation.costmaps.filter_info import CostmapFilterInfoConfig, CostmapFilterInfoNode
+from twin.nodes.navigation.costmaps.vector_objects import VectorObjectServerConfig, VectorObjectServerNode
 from twin.nodes.navigation.mapping.map_server import MapServerNode
 from twin.scenario.navigation import NavigationConfig
 from twin.warehouse.map_files import named_map
@@ -17,37 +18,38 @@ _KEEPOUT, _SPEED = "keepout", "speed"
 
 
 def build_zones(bus: Bus, config: NavigationConfig, frame: str, *, namespace: str = "") -> None:
-    """Create a mask server and an info server for each mask that the scenario names.
+    """Create what tells of zones: of the masks that the scenario names, and of those drawn during the run.
 
     Raises:
         MapError: a mask cannot be read.
     """
-    for kind, mask, number in (
-        (_KEEPOUT, config.keepout_mask, KEEPOUT_FILTER),
-        (_SPEED, config.speed_mask, SPEED_FILTER_PERCENT),
-    ):
-        if mask is None:
-            continue
-        MapServerNode(
-            bus,
-            OccupancyMap.load(named_map(mask)),
-            frame=frame,
-            name=f"{kind}_filter_mask_server",
-            topic=f"{kind}_filter_mask",
-            namespace=namespace,
-        )
-        CostmapFilterInfoNode(
-            bus,
-            CostmapFilterInfoConfig(
-                filter_info_topic=f"{kind}_costmap_filter_info", type=number, mask_topic=f"{kind}_filter_mask"
-            ),
-            name=f"{kind}_costmap_filter_info_server",
-            namespace=namespace,
-        )
+    for kind, mask in ((_KEEPOUT, config.keepout_mask), (_SPEED, config.speed_mask)):
+        if mask is not None:
+            MapServerNode(
+                bus,
+                OccupancyMap.load(named_map(mask)),
+                frame=frame,
+                name=f"{kind}_filter_mask_server",
+                topic=f"{kind}_filter_mask",
+                namespace=namespace,
+            )
+    drawn = VectorObjectServerConfig(global_frame_id=frame)
+    keepout = _info(bus, _KEEPOUT, KEEPOUT_FILTER, drawn.map_topic, namespace)
+    below = f"{_KEEPOUT}_filter_mask" if config.keepout_mask else ""
+    VectorObjectServerNode(bus, drawn, keepout.announce, below=below, namespace=namespace)
+    if config.speed_mask is not None:
+        _info(bus, _SPEED, SPEED_FILTER_PERCENT, f"{_SPEED}_filter_mask", namespace).announce()
+
+
+def _info(bus: Bus, kind: str, number: int, mask_topic: str, namespace: str) -> CostmapFilterInfoNode:
+    config = CostmapFilterInfoConfig(
+        filter_info_topic=f"{kind}_costmap_filter_info", type=number, mask_topic=mask_topic
+    )
+    return CostmapFilterInfoNode(bus, config, name=f"{kind}_costmap_filter_info_server", namespace=namespace)
 
 
 def with_filters(costmap: CostmapNodeConfig, config: NavigationConfig, *, speed: bool) -> CostmapNodeConfig:
-    """Return a costmap's config with the filters that the scenario has masks for.
+    """Return a costmap's config with its filters: keep-out zones, and the speeds of a mask.
 
     Args:
         costmap: The config.
@@ -56,6 +58,6 @@ def with_filters(costmap: CostmapNodeConfig, config: NavigationConfig, *, speed:
     """
     return replace(
         costmap,
-        keepout_filter_info_topic=f"{_KEEPOUT}_costmap_filter_info" if config.keepout_mask else "",
+        keepout_filter_info_topic=f"{_KEEPOUT}_costmap_filter_info",
         speed_filter_info_topic=f"{_SPEED}_costmap_filter_info" if speed and config.speed_mask else "",
     )

@@ -21,12 +21,14 @@ Pattern = Annotated[str, StringConstraints(pattern=r"^[/*]")]
 
 EVERYTHING = ("*",)
 _READING = (
+    "*/get_shapes",
     "/rosapi/*", "/twin/control", "*/get_parameters", "*/get_parameter_types", "*/list_parameters",
     "*/describe_parameters", "*/get_type_description", "*/get_state", "*/get_available_*", "*/get_map",
     "*/get_costmap", "*/get_cost", "*/map_server/map", "*/is_path_valid", "*/tf2_frames", "/republish_tfs",
 )  # fmt: skip
 _CHANGING = ("/rosapi/set_param", "/rosapi/delete_param")
 _OPERATING = (
+    "*/add_shapes", "*/remove_shapes",
     "*/guard/stop", "*/guard/release", "*/clear_*", "*/reinitialize_global_localization",
     "*/set_initial_pose", "*/toggle", "/clear", "/reset", "/spawn", "/kill",
     "*/teleport_absolute", "*/teleport_relative", "*/set_pen",
@@ -48,6 +50,7 @@ STEERING_TOPICS = (
 )  # fmt: skip
 """Other topics by which a robot is steered."""
 STEERING_SERVICES = (
+    "*/add_shapes", "*/remove_shapes",
     "*/guard/release", "*/reinitialize_global_localization", "*/set_initial_pose", "*/toggle",
     "*/teleport_absolute", "*/teleport_relative", "*/add_task", "*/cancel_task", "*/pause", "*/resume",
     "*/_action/send_goal", "*/_action/cancel_goal",

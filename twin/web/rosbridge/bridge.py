@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from twin.bridge.bags.reader import BagReader
 from twin.bridge.bus import Bus
 from twin.bridge.graph import Graph
 from twin.web.rosbridge.access import ROLES, Role
@@ -15,6 +16,7 @@ from twin.web.rosbridge.calls import Calls
 from twin.web.rosbridge.control import Control, ControlConfig
 from twin.web.rosbridge.frames import Frame
 from twin.web.rosbridge.goals import Goals
+from twin.web.rosbridge.history import History
 from twin.web.rosbridge.learner import Learner
 from twin.web.rosbridge.rosapi import Rosapi
 from twin.web.rosbridge.session import Session
@@ -53,13 +55,24 @@ class Bridge:
     """What all clients have in common."""
 
     def __init__(
-        self, bus: Bus, graph: Graph, config: BridgeConfig, now_s: Callable[[], float] = time.monotonic
+        self,
+        bus: Bus,
+        graph: Graph,
+        config: BridgeConfig,
+        now_s: Callable[[], float] = time.monotonic,
+        bag: BagReader | None = None,
     ) -> None:
+        """Begin without clients; with a bag its topics are there, at its own time.
+
+        Raises:
+            RecordingError: the bag cannot be looked at so.
+        """
         self.limits = config.limits
         self.now_s = now_s
         self.node = bus.create_node("rosbridge_websocket")
         learner = Learner(self.node)
-        self.topics = Topics(self.node, graph, learner, now_s)
+        self._history = None if bag is None else History(bag, bus, now_s)
+        self.topics = Topics(self.node, graph, learner, now_s, self._history)
         self.calls = Calls(self.node, graph, learner, now_s)
         self.goals = Goals(self.node, graph, learner, now_s)
         self.control = Control(self.node, config.control, now_s, self.topics.say)
@@ -73,7 +86,9 @@ class Bridge:
     def is_waiting(self) -> bool:
         """Whether `update` has something to do soon."""
         parts = (self.topics, self.calls, self.goals, self.control, self.transforms)
-        return any(part.is_waiting for part in parts)
+        return any(part.is_waiting for part in parts) or (
+            self._history is not None and self._history.is_waiting
+        )
 
     def join(self, name: str, role: Role, send: Callable[[Frame, str | None], None]) -> Session:
         """Return the session of a new client."""
@@ -94,6 +109,8 @@ class Bridge:
     def update(self) -> None:
         """Go on with what has waited; called after every spin of the bus."""
         self.control.update()
+        if self._history is not None:
+            self._history.update()
         self.topics.update()
         self.calls.update()
         self.goals.update()

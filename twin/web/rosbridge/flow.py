@@ -65,6 +65,10 @@ class Flow:
             self._last_s = now_s
             self._pass(self._queue.popleft())
 
+    def forget(self) -> None:
+        """Let nothing wait: what it is of is over."""
+        self._queue.clear()
+
     @property
     def compression(self) -> Compression:
         """The strongest that is asked for."""
@@ -84,3 +88,19 @@ class Flow:
         size = min(sizes, default=None)
         for piece in in_fragments(frame, size, next(_numbers)) if size else (frame,):
             self._send(piece)
+
+
+class Watch(Flow):
+    """A topic for who is no client of the protocol: each message as it came."""
+
+    def __init__(self, take: Callable[[Heard], None], forget: Callable[[], None] = lambda: None) -> None:
+        super().__init__(lambda frame: None, lambda told: None)
+        self.wanted[None] = Wanted()
+        self._take, self._forget = take, forget
+
+    def forget(self) -> None:
+        """Tell that what was heard is over."""
+        self._forget()
+
+    def _pass(self, heard: Heard) -> None:
+        self._take(heard)

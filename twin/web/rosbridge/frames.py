@@ -5,8 +5,10 @@ from __future__ import annotations
 import base64
 import math
 import struct
+import threading
 import zlib
-from typing import Any, Literal, get_args
+from collections.abc import Callable, Hashable
+from typing import Any, Literal, TypeVar, get_args
 
 from twin.bridge.cdr.codec import Codec
 from twin.bridge.topics.raw import RawSample
@@ -18,6 +20,7 @@ COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
 Frame = str | bytes
 """A text frame, or a binary one."""
 
+H = TypeVar("H", bound=Hashable)
 _NS = 1_000_000_000
 
 
@@ -48,7 +51,7 @@ def from_json(text: Frame) -> dict[str, Any]:
 class Heard:
     """A message of a topic on its way to clients; made into a frame once for all that want it so."""
 
-    __slots__ = ("_codec", "_frames", "_message", "sample")
+    __slots__ = ("_codec", "_frames", "_made_of_it", "_making", "_message", "sample")
 
     def __init__(self, sample: RawSample, codec: Codec[Any] | None) -> None:
         """Take a sample; only `cbor-raw` does without a codec."""
@@ -56,6 +59,19 @@ class Heard:
         self._codec = codec
         self._message: Any = None
         self._frames: dict[Compression, Frame] = {}
+        self._made_of_it: dict[Hashable, bytes] = {}
+        self._making = threading.Lock()
+
+    def made(self, how: H, make: Callable[[Any, H], bytes]) -> bytes:
+        """Return what `make` makes of the message in a way, once for all that want it so; in any thread.
+
+        Raises:
+            BridgeError: as `frame`, and what `make` raises.
+        """
+        with self._making:
+            if how not in self._made_of_it:
+                self._made_of_it[how] = make(self.message, how)
+            return self._made_of_it[how]
 
     def frame(self, compression: Compression) -> Frame:
         """Return the `publish` of this message.
@@ -72,15 +88,17 @@ class Heard:
             return to_json({"op": "png", "data": png_of(str(self.frame("none")))})
         publish: dict[str, Any] = {"op": "publish", "topic": self.sample.topic}
         if compression == "none":
-            return to_json({**publish, "msg": to_values(self._decoded())})
+            return to_json({**publish, "msg": to_values(self.message)})
         import cbor2
 
         if compression == "cbor":
-            return cbor2.dumps({**publish, "msg": to_values(self._decoded(), "cbor")})
+            return cbor2.dumps({**publish, "msg": to_values(self.message, "cbor")})
         secs, nsecs = divmod(self.sample.source.time_ns, _NS)
         return cbor2.dumps({**publish, "msg": {"secs": secs, "nsecs": nsecs, "bytes": self.sample.payload}})
 
-    def _decoded(self) -> Any:
+    @property
+    def message(self) -> Any:
+        """The message; raises BridgeError as `frame`."""
         if self._codec is None:
             raise BridgeError(f"the type {self.sample.type} of {self.sample.topic} is not known here (yet)")
         if self._message is None:

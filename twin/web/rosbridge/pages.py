@@ -31,9 +31,15 @@ class Page(NamedTuple):
     status: int
     content_type: str
     body: bytes
+    headers: tuple[tuple[str, str], ...] = ()
 
 
-NOT_FOUND = Page(404, "text/plain; charset=utf-8", b"not found\n")
+def refusal(status: int, why: str) -> Page:
+    """Return an answer that says in words why there is no other."""
+    return Page(status, "text/plain; charset=utf-8", f"{why}\n".encode())
+
+
+NOT_FOUND = refusal(404, "not found")
 
 
 def policy_of(page: Page) -> str:

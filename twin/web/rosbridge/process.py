@@ -7,6 +7,7 @@ from collections.abc import Callable
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
+from twin.bridge.bags.reader import BagReader
 from twin.bridge.graph import Graph
 from twin.bridge.live import LiveBus
 from twin.errors import BridgeError
@@ -22,10 +23,17 @@ _AUDIT_BYTES = 50_000_000
 class Rosbridge:
     """A bridge and its server on one bus."""
 
-    def __init__(self, process: LiveBus, config: ServerConfig, bridging: BridgeConfig) -> None:
-        """Join and listen.
+    def __init__(
+        self,
+        process: LiveBus,
+        config: ServerConfig,
+        bridging: BridgeConfig,
+        bag: BagReader | None = None,
+    ) -> None:
+        """Join and listen; with a bag its topics are there as well.
 
         Raises:
+            RecordingError: see `Bridge`.
             BridgeError: see `Server.start`; or the extra is not installed.
         """
         try:
@@ -38,7 +46,7 @@ class Rosbridge:
         self._process = process
         self._graph = Graph.watch(process.bus)
         process.bus.starting()
-        self.bridge = Bridge(process.bus, self._graph, bridging)
+        self.bridge = Bridge(process.bus, self._graph, bridging, bag=bag)
         process.bus.started()
         self.server = Server(config, bridging.limits, process.bus.external.wake)
         self.server.start()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import ipaddress
-import socket
 import ssl
 import threading
 import time
@@ -13,14 +11,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from twin.errors import BridgeError
-from twin.web.rosbridge.access import ROLES, STOPS, Role, Token, find_token, matches
+from twin.web.rosbridge.access import ROLES, STOPS, Role, Token, matches
 from twin.web.rosbridge.bridge import Bridge, Limits
+from twin.web.rosbridge.door import Door, given_token, is_loopback, peer_of
 from twin.web.rosbridge.frames import from_json, to_json
+from twin.web.rosbridge.http.answers import Http, response
 from twin.web.rosbridge.outbox import Outbox
-from twin.web.rosbridge.pages import Page, page_of, policy_of
+from twin.web.rosbridge.pages import page_of, refusal
+from twin.web.rosbridge.rates import Bucket
 from twin.web.rosbridge.session import Session
 
 if TYPE_CHECKING:
@@ -29,11 +30,8 @@ if TYPE_CHECKING:
 
 _AUTH_S = 5.0
 """How long a client may take to tell its token [s]."""
-_WRONG_TOKENS = 10
-_LOCKED_S = 60.0
 _MOST_PENDING = 200
 """Messages of one client that wait for the bridge."""
-_LOCAL = ("localhost", "127.0.0.1", "::1")
 
 
 @dataclass(frozen=True)
@@ -59,17 +57,10 @@ class ServerConfig:
 
     def __post_init__(self) -> None:
         """Refuse to be open to all."""
-        if not self.tokens and not _is_loopback(self.address):
+        if not self.tokens and not is_loopback(self.address):
             raise BridgeError(
                 f"--address {self.address} is not this computer alone; with --token FILE others may come in"
             )
-
-
-def _is_loopback(address: str) -> bool:
-    try:
-        return address == "localhost" or ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return False
 
 
 class Connection:
@@ -84,9 +75,8 @@ class Connection:
         self.pending = 0
         self.filled = asyncio.Event()
         self._loop = loop
-        self._rate = limits.messages_per_s
-        self._tokens = self._burst = 2.0 * limits.messages_per_s
-        self._last_s = self._told_s = 0.0
+        self.rate = Bucket(limits.messages_per_s)
+        self._told_s = 0.0
 
     def send(self, frame: str | bytes, topic: str | None) -> None:
         """Let a frame be sent; called in any thread."""
@@ -102,16 +92,6 @@ class Connection:
         if time.monotonic() - self._told_s > 1.0:
             self._told_s = time.monotonic()
             self.send(to_json({"op": "status", "level": "error", "msg": why}), None)
-
-    def may_send(self, now_s: float) -> bool:
-        """Take note of a message; return whether it is within the rate."""
-        self._tokens = min(self._burst, self._tokens + (now_s - self._last_s) * self._rate)
-        self._last_s = now_s
-        self._tokens -= 1.0
-        if self._tokens < 0.0:
-            self._tokens = 0.0
-            return False
-        return True
 
 
 @dataclass
@@ -131,9 +111,10 @@ class Server:
         self._config, self._limits, self._wake = config, limits, wake
         self._stops: deque[_Event] = deque()
         self._events: deque[_Event] = deque()
-        self._wrong: dict[str, tuple[int, float]] = {}
-        self._strangers: deque[tuple[str, str]] = deque(maxlen=100)
-        """Who was not let in, and why: for the audit."""
+        self._jobs: deque[Callable[[Bridge], None]] = deque()
+        """What clients without a websocket want of the bridge."""
+        self._door = Door(config, wake)
+        self._http = Http(config, limits, self._door, self._ask, lambda: len(self.connections))
         self._ready = threading.Event()
         self._fault: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -162,8 +143,10 @@ class Server:
 
     def work(self, bridge: Bridge) -> None:
         """Do what clients want, stops first; called in the bridge's thread."""
-        while self._strangers:
-            bridge.audit_stranger(*self._strangers.popleft())
+        while self._door.strangers:
+            bridge.audit_stranger(*self._door.strangers.popleft())
+        while self._jobs:
+            self._jobs.popleft()(bridge)
         for _ in range(len(self._events) + len(self._stops)):
             event = self._stops.popleft() if self._stops else self._events.popleft() if self._events else None
             if event is None:
@@ -192,6 +175,8 @@ class Server:
     async def _serve(self) -> None:
         from websockets.asyncio.server import serve
 
+        from twin.web.rosbridge.http.connection import WebConnection
+
         config, secure = self._config, None
         if config.certificate is not None:
             secure = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
@@ -205,6 +190,8 @@ class Server:
             self._on_client,
             config.address,
             config.port,
+            create_connection=WebConnection,
+            open_timeout=None,  # see WebConnection
             process_request=self._on_request,
             max_size=self._limits.message_bytes,
             max_queue=16,
@@ -217,66 +204,38 @@ class Server:
             self.address = f"{'ws' if secure is None else 'wss'}://{shown}:{port}"
             self._ready.set()
             await self._end.wait()
+            self._http.close()
 
-    def _on_request(self, connection: ServerConnection, request: Request) -> Response | None:
-        host = request.headers.get("Host", "")
-        if not self._is_own_name(_hostname(f"//{host}")):
-            return _response(Page(403, "text/plain", b"this server has another name\n"))
+    async def _on_request(self, websocket: ServerConnection, request: Request) -> Response | None:
+        if not self._door.is_own_name(request.headers.get("Host", "")):
+            return response(refusal(403, "this server has another name"))
         if request.headers.get("Upgrade", "").lower() != "websocket":
-            return _response(page_of(self._config.folders, urlsplit(request.path).path))
-        origin = request.headers.get("Origin")
-        if origin is not None and not self._may_come_from(origin, host):
-            return _response(Page(403, "text/plain", b"pages of this origin may not connect\n"))
-        if len(self.connections) >= self._limits.clients:
-            return _response(Page(503, "text/plain", b"too many clients\n"))
-        given = _given_token(request)
+            page = await self._http.answer(websocket, request)
+            if page is None:
+                page = page_of(self._config.folders, urlsplit(request.path).path)
+            return response(page)
+        if not self._door.is_welcome(request):
+            return response(refusal(403, "pages of this origin may not connect"))
+        if len(self.connections) + len(self._http.streams) >= self._limits.clients:
+            return response(refusal(503, "too many clients"))
+        given = given_token(request)
         if self._config.tokens and given is not None:
-            token = self._checked(_peer(connection), given)
+            token = self._door.checked(peer_of(websocket), given)
             if token is None:
-                return _response(Page(401, "text/plain", b"wrong token\n"))
-            connection.token = token  # type: ignore[attr-defined]
+                return response(refusal(401, "wrong token"))
+            websocket.token = token  # type: ignore[attr-defined]
         return None
 
-    def _is_own_name(self, name: str) -> bool:
-        """Whether a Host is us: a name of somebody else's that leads here is DNS rebinding."""
-        if name in (*_LOCAL, self._config.address, socket.gethostname().lower(), *self._config.hosts):
-            return True
-        try:
-            ipaddress.ip_address(name)
-        except ValueError:
-            return False
-        return not _is_loopback(self._config.address)
-
-    def _may_come_from(self, origin: str, host: str) -> bool:
-        if origin in self._config.origins:
-            return True
-        parts = urlsplit(origin)
-        is_local = _is_loopback(self._config.address) and _hostname(origin) in _LOCAL
-        return parts.scheme in ("http", "https") and (is_local or parts.netloc.lower() == host.lower())
-
-    def _checked(self, peer: str, secret: str) -> Token | None:
-        """Return the token that a client has told; after ten wrong ones, for a while, none."""
-        count, since_s = self._wrong.get(peer, (0, 0.0))
-        now_s = time.monotonic()
-        if count >= _WRONG_TOKENS and now_s - since_s < _LOCKED_S:
-            return None  # told of already, ten times
-        token = find_token(self._config.tokens, secret)
-        if token is not None:
-            self._wrong.pop(peer, None)
-        else:
-            if len(self._wrong) > 10_000:
-                self._wrong.clear()
-            self._wrong[peer] = (count + 1 if now_s - since_s < _LOCKED_S else 1, now_s)
-            self._strangers.append((peer, "wrong token"))
-            self._wake()
-        return token
+    def _ask(self, job: Callable[[Bridge], None]) -> None:
+        self._jobs.append(job)
+        self._wake()
 
     async def _on_client(self, websocket: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
 
         token: Token | None = getattr(websocket, "token", None)
         role = token.role if token else None if self._config.tokens else self._config.open_to
-        peer = _peer(websocket)
+        peer = peer_of(websocket)
         assert self._loop is not None
         connection = Connection(token.name if token else peer, role, self._limits, self._loop)
         self.connections.add(connection)
@@ -305,7 +264,7 @@ class Server:
             except BridgeError:
                 message = {}
             secret = message.get("token") if message.get("op") == "auth" else None
-            token = self._checked(peer, secret) if isinstance(secret, str) else None
+            token = self._door.checked(peer, secret) if isinstance(secret, str) else None
             if token is None:
                 await websocket.close(1008, "the first message is auth, with a token that is known")
                 return
@@ -316,11 +275,11 @@ class Server:
         try:
             message = from_json(text)
         except BridgeError as error:
-            connection.may_send(time.monotonic())
+            connection.rate.may_go(time.monotonic())
             connection.refuse(str(error))
             return
         is_stop = _is_stop(message)
-        if not is_stop and not connection.may_send(time.monotonic()):
+        if not is_stop and not connection.rate.may_go(time.monotonic()):
             connection.refuse(
                 f"more than {self._limits.messages_per_s:g} messages a second: some were dropped"
             )
@@ -354,42 +313,3 @@ class Server:
 def _is_stop(message: dict[str, Any]) -> bool:
     name = message.get({"publish": "topic", "call_service": "service"}.get(str(message.get("op")), ""))
     return isinstance(name, str) and matches(f"/{name.lstrip('/')}", STOPS)
-
-
-def _given_token(request: Request) -> str | None:
-    header = request.headers.get("Authorization", "")
-    if header.startswith("Bearer "):
-        return header.removeprefix("Bearer ").strip()
-    found = parse_qs(urlsplit(request.path).query).get("token")
-    return found[0] if found else None
-
-
-def _hostname(url: str) -> str:
-    try:
-        return (urlsplit(url).hostname or "").lower()
-    except ValueError:
-        return ""
-
-
-def _peer(connection: ServerConnection) -> str:
-    address = connection.remote_address
-    return str(address[0]) if address else "somebody"
-
-
-def _response(page: Page) -> Response:
-    from websockets.datastructures import Headers
-    from websockets.http11 import Response
-
-    reasons = {200: "OK", 401: "Unauthorized", 403: "Forbidden", 404: "Not Found", 503: "Service Unavailable"}
-    headers = Headers(
-        {
-            "Content-Type": page.content_type,
-            "Content-Length": str(len(page.body)),
-            "Content-Security-Policy": policy_of(page),
-            "X-Content-Type-Options": "nosniff",
-            "Referrer-Policy": "no-referrer",
-            "Cache-Control": "no-cache",
-            "Connection": "close",
-        }
-    )
-    return Response(page.status, reasons[page.status], headers, page.body)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +17,9 @@ from twin.bridge.topics import Publisher
 from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.bridge.topics.raw_publisher import Presence
 from twin.errors import BridgeError
-from twin.web.rosbridge.flow import Flow, Wanted
+from twin.web.rosbridge.flow import Flow, Wanted, Watch
 from twin.web.rosbridge.frames import Heard
+from twin.web.rosbridge.history import History
 from twin.web.rosbridge.learner import Learner, type_name
 from twin.web.rosbridge.values import to_message
 
@@ -47,35 +48,46 @@ class Source:
         given: str | None,
         learner: Learner,
         now_s: Callable[[], float],
+        history: History | None,
     ) -> None:
-        self.flows: dict[Session, Flow] = {}
+        self._history = history if history is not None and history.has(topic) else None
+        self.flows: dict[Hashable, Flow] = {}
         self._graph, self._topic, self._learner, self._now_s = graph, topic, learner, now_s
         self._codecs: dict[tuple[str, str], Codec[Any] | None] = {}
         self._retained: OrderedDict[bytes, deque[Heard]] = OrderedDict()
+        self._endpoints: list[Presence | RawSubscription] = []
+        if self._history is not None:
+            self._history.hear(topic, self._on_sample)
+            return
         publishers = graph.publishers(topic)
         latched = not publishers or any(p.qos.durability == "transient_local" for p in publishers)
         qos = QoS(depth=_DEPTH, durability="transient_local" if latched else "volatile")
-        self._endpoints: list[Presence | RawSubscription] = []
         typename = publishers[0].type if publishers else given
         if typename is not None and is_known(typename):
             self._endpoints.append(Presence(node, "MS", topic, typename, types.rihs01(typename), qos))
         self._endpoints.append(RawSubscription(node, topic, self._on_sample, qos))
 
-    def join(self, session: Session, flow: Flow) -> None:
-        """Let a client hear the topic, first what was latched."""
-        self.flows[session] = flow
+    def join(self, who: Hashable, flow: Flow) -> None:
+        """Let somebody hear the topic, first what was latched."""
+        self.flows[who] = flow
+        if self._history is not None:
+            for sample in self._history.state([self._topic]):
+                flow.offer(Heard(sample, self._codec(sample)), self._now_s())
         for kept in self._retained.values():
             for heard in kept:
                 flow.offer(heard, self._now_s())
 
     def destroy(self) -> None:
         """Hear nothing any more."""
+        if self._history is not None:
+            self._history.leave(self._topic)
         for endpoint in self._endpoints:
             endpoint.node.destroy_subscription(endpoint)  # type: ignore[arg-type]
 
     def _on_sample(self, sample: RawSample) -> None:
         heard = Heard(sample, self._codec(sample))
-        self._retain(sample, heard)
+        if self._history is None:
+            self._retain(sample, heard)
         for flow in tuple(self.flows.values()):
             flow.offer(heard, self._now_s())
 
@@ -115,8 +127,18 @@ class _Outlet:
 class Topics:
     """All that clients hear and publish."""
 
-    def __init__(self, node: Node, graph: Graph, learner: Learner, now_s: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        graph: Graph,
+        learner: Learner,
+        now_s: Callable[[], float],
+        history: History | None = None,
+    ) -> None:
         self._node, self._graph, self._learner, self._now_s = node, graph, learner, now_s
+        self._history = history
+        if history is not None:
+            history.on_jump(self._forget)
         self._sources: dict[str, Source] = {}
         self._outlets: dict[str, _Outlet] = {}
 
@@ -138,10 +160,7 @@ class Topics:
         topic = self._node.resolve_name(name)
         expected = None if given is None else type_name(given, "msg")
         self._check(topic, expected)
-        source = self._sources.get(topic)
-        if source is None:
-            source = Source(self._node, self._graph, topic, expected, self._learner, self._now_s)
-            self._sources[topic] = source
+        source = self._source(topic, expected)
         flow = source.flows.get(session)
         is_new = flow is None
         if flow is None:
@@ -164,9 +183,44 @@ class Topics:
             flow.wanted.clear()
         flow.wanted.pop(key, None)
         if not flow.wanted:
-            del source.flows[session]
-        if not source.flows:
+            self.unwatch(session, topic)
+
+    def watch(
+        self,
+        who: Hashable,
+        topic: str,
+        take: Callable[[Heard], None],
+        expected: str | None = None,
+        forget: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Let somebody who is no client hear a topic, by its absolute name, message by message.
+
+        Args:
+            who: To end it by.
+            topic: Its name.
+            take: Takes a message.
+            expected: Type, if nobody tells it yet.
+            forget: Called when what was heard is over: a bag goes to another time.
+        """
+        self._source(topic, expected).join(who, Watch(take, forget))
+
+    def _forget(self) -> None:
+        for source in self._sources.values():
+            for flow in source.flows.values():
+                flow.forget()
+
+    def unwatch(self, who: Hashable, topic: str) -> None:
+        """End what somebody hears of a topic; a topic that nobody hears any more is left."""
+        source = self._sources.get(topic)
+        if source is not None and source.flows.pop(who, None) is not None and not source.flows:
             self._sources.pop(topic).destroy()
+
+    def _source(self, topic: str, expected: str | None) -> Source:
+        if topic not in self._sources:
+            self._sources[topic] = Source(
+                self._node, self._graph, topic, expected, self._learner, self._now_s, self._history
+            )
+        return self._sources[topic]
 
     def count(self, session: Session) -> int:
         """Return how many topics a client hears and publishes."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import zlib
 from collections import Counter
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from struct import Struct
@@ -54,6 +54,8 @@ class _Block(NamedTuple):
     end_ns: int
     offset: int
     length: int
+    channels: frozenset[int] | None
+    """Whose messages are in it; None: nobody tells."""
 
 
 class McapReader:
@@ -98,6 +100,38 @@ class McapReader:
                     heapq.heappush(waiting, (message.log_time, block.offset, number, message))
         while waiting:
             yield heapq.heappop(waiting)[3]
+
+    def last(self, counts: Mapping[int, int], until_ns: int) -> list[records.Message]:
+        """Return the last messages of channels up to a log time, by that; equal times as in the file.
+
+        Only chunks are read that hold such a channel, the latest first, until each has so many messages.
+
+        Args:
+            counts: How many of each channel.
+            until_ns: Log time of the last [ns].
+
+        Raises:
+            RecordingError: a chunk is damaged.
+        """
+        blocks = sorted((b for b in self._blocks if b.start_ns <= until_ns), key=lambda b: b.end_ns)
+        found: dict[int, list[tuple[int, int, int, records.Message]]] = {each: [] for each in counts}
+        for block in reversed(blocks):
+            # Done with a channel: it has enough, none of them earlier than anything in blocks to come.
+            wanted = {
+                channel
+                for channel, count in counts.items()
+                if len(kept := found[channel]) < count or kept[0][0] < block.end_ns
+            }
+            if not wanted:
+                break
+            if block.channels is not None and not block.channels & wanted:
+                continue
+            for number, message in enumerate(self._messages_of(block)):
+                if message.channel_id in wanted and message.log_time <= until_ns:
+                    found[message.channel_id].append((message.log_time, block.offset, number, message))
+            for channel in wanted:
+                found[channel] = sorted(found[channel])[-counts[channel] :]
+        return [each[3] for each in sorted(entry for kept in found.values() for entry in kept)]
 
     def attachment(self, name: str) -> bytes | None:
         """Return the last attachment of that name, None if there is none."""
@@ -151,11 +185,15 @@ class McapReader:
         if footer.summary_crc and zlib.crc32(summary + tail[: _FOOTER_SIZE - 4]) != footer.summary_crc:
             raise ValueError("has a damaged summary")
         statistics = None
+        same: dict[frozenset[int] | None, frozenset[int] | None] = {}  # a set for all that are equal
         for op, content in _records(summary):
             record = _parse(op, content)
             if isinstance(record, records.ChunkIndex):
                 times = record.message_start_time, record.message_end_time
-                self._blocks.append(_Block(*times, record.chunk_start_offset, record.chunk_length))
+                channels = frozenset(record.message_index_offsets) or None
+                channels = same.setdefault(channels, channels)
+                block = _Block(*times, record.chunk_start_offset, record.chunk_length, channels)
+                self._blocks.append(block)
             elif isinstance(record, records.Statistics):
                 statistics = record
             elif isinstance(record, records.MetadataIndex):
@@ -196,13 +234,17 @@ class McapReader:
         if isinstance(record, records.Attachment):
             self._attachments[record.name] = (at, whole)
         elif isinstance(record, records.Chunk):
+            before = self.counts.copy()
             for inner, content in _records(_unpacked(record)):
                 self._keep(_parse(inner, content))
-            self._blocks.append(_Block(record.message_start_time, record.message_end_time, at, whole))
+            times = record.message_start_time, record.message_end_time
+            channels = frozenset(self.counts - before)
+            self._blocks.append(_Block(*times, at, whole, channels))
         else:
             self._keep(record)
             if isinstance(record, records.Message):
-                self._blocks.append(_Block(record.log_time, record.log_time, at, whole))
+                channels = frozenset([record.channel_id])
+                self._blocks.append(_Block(record.log_time, record.log_time, at, whole, channels))
 
     def _keep(self, record: records.McapRecord | None) -> None:
         """Take in what a record tells."""

@@ -29,7 +29,7 @@ class CostmapFilterInfoConfig:
 
 
 class CostmapFilterInfoNode:
-    """Publishes the info once; late subscribers get it too."""
+    """Publishes the info once, when it is announced; late subscribers get it too."""
 
     def __init__(
         self,
@@ -41,6 +41,11 @@ class CostmapFilterInfoNode:
     ) -> None:
         self.node = bus.create_node(name, namespace)
         declare_config(self.node, config)
+        self._config = config
+
+    def announce(self) -> None:
+        """Tell of the mask."""
+        config = self._config
         publisher = self.node.create_publisher(CostmapFilterInfo, config.filter_info_topic, LATCHED)
         publisher.publish(
             CostmapFilterInfo(

@@ -79,7 +79,6 @@ class KeepoutFilterPart:
     def __init__(
         self, node: Node, pose: RobotPose, frame: str, info_topic: str, config: KeepoutConfig
     ) -> None:
-        warm_up_keepout()
         self._pose, self._frame, self._config = pose, frame, config
         self._filter: KeepoutFilter | None = None
         self._mask_frame = frame
@@ -95,6 +94,7 @@ class KeepoutFilterPart:
             layers.set_keepout(self._filter, robot, T_mask_costmap)
 
     def _on_mask(self, _info: Any, mask: OccupancyMap, frame: str) -> None:
+        warm_up_keepout()
         self._filter, self._mask_frame = KeepoutFilter(mask=mask, config=self._config), frame
 
 

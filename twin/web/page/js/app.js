@@ -1,7 +1,10 @@
 /** The operator's page: what stands where. */
 
 import { html, render, useEffect, useReducer, useRef, useState } from "ui";
+import { ZoneBar, Zones, ZonesPanel } from "./zones.js";
+import { Camera } from "./camera.js";
 import { Drive } from "./drive.js";
+import { HistoryBar, Mission } from "./history.js";
 import { MapCanvas } from "./map.js";
 import { Rosbridge } from "./rosbridge.js";
 import { Station } from "./station.js";
@@ -35,7 +38,7 @@ function EmergencyStop({ station, t }) {
 
 function Control({ station, t }) {
   const control = station.control;
-  if (!control) return null;
+  if (!control || station.history) return null;
   const mine = control.holder && control.holder_id === control.own;
   const words = mine ? t("controlMine") : control.holder ? `${control.holder} ${t("controlOther")}` : t("controlNone");
   const command = mine ? "release" : control.holder ? "take_over" : "take";
@@ -60,7 +63,7 @@ function Header({ station, t, theme, setTheme, language, setLanguage }) {
       <div class="wide"><${Control} station=${station} t=${t} /></div>
       <button class="plain" id="language" lang=${language === "en" ? "zh" : "en"} onClick=${() => setLanguage(language === "en" ? "zh" : "en")}>${t("language")}</button>
       <button class="plain" id="theme" aria-label=${t("theme")} title=${t("theme")} onClick=${() => setTheme(theme === "dark" ? "light" : "dark")}>${theme === "dark" ? "☀" : "☾"}</button>
-      <${EmergencyStop} station=${station} t=${t} />
+      ${!station.history && html`<${EmergencyStop} station=${station} t=${t} />`}
     </header>`;
 }
 
@@ -123,11 +126,6 @@ function Log({ station, t }) {
   return html`<ol class="log">${station.log.map((line) => html`<li key=${line.key} class=${line.level}><time>${clock(line.time)}</time> <b>${line.source}</b> ${line.text}</li>`)}</ol>`;
 }
 
-function Camera({ station, t }) {
-  if (!station.cameras.size) return html`<p class="muted">${t("noCamera")}</p>`;
-  return [...station.cameras].map(([topic, url]) => html`<figure><img class="camera" src=${url} alt=${topic} /><figcaption class="muted">${topic}</figcaption></figure>`);
-}
-
 /** A component of a module that is loaded when it is first shown: three and uPlot are large. */
 function Lazy({ load, ...props }) {
   const [loaded, setLoaded] = useState(null);
@@ -135,11 +133,18 @@ function Lazy({ load, ...props }) {
   return loaded && html`<${loaded} ...${props} />`;
 }
 
-const PANELS = { drive: Drive, tasks: Tasks, alarms: Alarms, log: Log, plot: (props) => html`<${Lazy} load=${() => import("./plot.js").then((m) => m.Plot)} ...${props} />`, camera: Camera };
+const PANELS = { drive: Drive, tasks: Tasks, zones: ZonesPanel, alarms: Alarms, log: Log, plot: (props) => html`<${Lazy} load=${() => import("./plot.js").then((m) => m.Plot)} ...${props} />`, camera: Camera };
 
-function Panels({ station, t, panel, setPanel }) {
-  const Panel = PANELS[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
-  const names = Object.keys(PANELS);
+/** What there is to see, and, now, to do. */
+function panelsOf(station) {
+  const { drive, tasks, zones, ...rest } = PANELS;
+  return station.history ? { mission: Mission, ...rest } : PANELS;
+}
+
+function Panels({ station, t, panel: chosen, setPanel }) {
+  const panels = panelsOf(station), panel = panels[chosen] ? chosen : Object.keys(panels)[0];
+  const Panel = panels[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
+  const names = Object.keys(panels);
   const turn = (event) => {
     const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!by) return;
@@ -157,6 +162,7 @@ function Stage({ station, t }) {
   const [layers, setLayers] = useState({ costmap: true, scan: true, plan: true, zones: true });
   const view = useRef();
   const set = (x, y, yaw) => {
+    if (tool === "zone") return station.zones.click(x, y);
     if (tool === "pose") station.estimate(x, y, yaw);
     else station.add(x, y, yaw, { now: tool === "goal" });
     if (tool !== "waypoint") setTool("pan");
@@ -168,8 +174,9 @@ function Stage({ station, t }) {
       : html`<${Lazy} load=${() => import("./scene.js").then((m) => m.Scene)} station=${station} label=${t("sceneLabel")} />`}
     <div class="bar top" role="toolbar" aria-label=${t("tools")}>
       ${toggle("view3d", mode === "3d", () => setMode(mode === "map" ? "3d" : "map"))}
-      ${mode === "map" && ["goal", "waypoint", "pose"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
+      ${mode === "map" && !station.history && ["goal", "waypoint", "pose", "zone"].map((name) => toggle(name, tool === name, () => setTool(tool === name ? "pan" : name)))}</div>
     ${mode === "map" && hints[tool] && html`<div class="hint" role="status">${t(hints[tool])}</div>`}
+    ${mode === "map" && tool === "zone" && html`<${ZoneBar} station=${station} t=${t} done=${() => setTool("pan")} />`}
     ${mode === "map" && html`<div class="bar bottom" role="toolbar" aria-label=${t("layers")}>
       <button class="icon" aria-label=${t("zoomOut")} onClick=${() => view.current.zoom(0.8)}>−</button><button class="icon" aria-label=${t("zoomIn")} onClick=${() => view.current.zoom(1.25)}>+</button>
       <button onClick=${() => { setFollow(false); view.current.fit(); }}>${t("fit")}</button>${toggle("follow", follow, () => setFollow(!follow))}
@@ -186,7 +193,7 @@ function App({ station }) {
   useEffect(() => { document.documentElement.lang = language; keep("language", language); }, [language]);
   useEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
   const t = wordsOf(language), props = { station, t };
-  return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} />
+  return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
     <${Banner} ...${props} />
     <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }
@@ -195,5 +202,6 @@ const token = new URLSearchParams(location.search).get("token");
 const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/${token ? `?token=${encodeURIComponent(token)}` : ""}`;
 const station = new Station(new Rosbridge(url), kept("name", `page ${Math.floor(Math.random() * 900 + 100)}`));
 keep("name", station.name);
+station.zones = new Zones(station);
 station.ros.addEventListener("connection", () => station.ros.connected && station.take(""));
 render(html`<${App} station=${station} />`, document.getElementById("app"));

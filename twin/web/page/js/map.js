@@ -4,31 +4,7 @@ import { html, useLayoutEffect, useRef } from "ui";
 import { compose, place, poseOf, yawOf } from "./transforms.js";
 
 const DRAG_PX = 8;
-const TURNED = 1.1;
-
-/** Grid as a picture: free, occupied and unknown of a map; cost of a costmap, clear where it is free. */
-function picture(grid, kind, colours) {
-  const { width, height } = grid.info;
-  const canvas = document.createElement("canvas");
-  canvas.width = width;
-  canvas.height = height;
-  const image = new ImageData(width, height);
-  for (let i = 0; i < width * height; i++) {
-    const value = grid.data[i];
-    const at = 4 * ((height - 1 - Math.floor(i / width)) * width + (i % width));
-    const rgba = kind === "map" ? (value < 0 ? colours.unknown : value > 50 ? colours.wall : colours.free)
-      : value <= 0 ? [0, 0, 0, 0] : kind === "zones" ? [...colours.zone, 90]
-      : value >= 99 ? [...colours.lethal, 90] : [...colours.cost, 10 + 0.7 * value];
-    image.data.set(rgba, at);
-  }
-  canvas.getContext("2d").putImageData(image, 0, 0);
-  return canvas;
-}
-
-function hex(name) {
-  const text = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  return [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16));
-}
+const KINDS = ["map", "zones", "global", "local"]; // from below
 
 export class MapView {
   constructor(canvas, station) {
@@ -38,7 +14,6 @@ export class MapView {
     this.centre = [0, 0];
     this.layers = {};
     this.tool = "pan";
-    this._pictures = new Map();
     this._pointers = new Map();
     canvas.addEventListener("pointerdown", (event) => this._down(event));
     canvas.addEventListener("pointermove", (event) => this._move(event));
@@ -52,7 +27,7 @@ export class MapView {
   }
 
   fit() {
-    const grid = this.station.robot?.grids.map?.message;
+    const grid = this.station.robot?.grids.map;
     const { clientWidth: w, clientHeight: h } = this.canvas;
     if (!grid) return false;
     const { width, height, resolution, origin } = grid.info;
@@ -77,7 +52,7 @@ export class MapView {
 
   _zoom(by, x, y) {
     const before = this.world(x, y);
-    this.scale = Math.min(400, Math.max(4, this.scale * by));
+    this.scale = Math.min(400, Math.max(0.5, this.scale * by));
     const after = this.world(x, y);
     this.centre = [this.centre[0] + before[0] - after[0], this.centre[1] + before[1] - after[1]];
   }
@@ -145,8 +120,9 @@ export class MapView {
     const robot = station.robot;
     if (!robot) return;
     if (this.follow) this.centre = robot.pose.pose.p.slice(0, 2);
-    for (const kind of ["map", "zones", "global", "local"])
-      if (robot.grids[kind] && (kind === "map" || this.layers[kind === "zones" ? "zones" : "costmap"])) this._grid(c, robot, kind);
+    const grids = Object.values(robot.grids).sort((a, b) => KINDS.indexOf(a.kind) - KINDS.indexOf(b.kind));
+    for (const grid of grids)
+      if (grid.kind === "map" || this.layers[grid.kind === "zones" ? "zones" : "costmap"]) this._grid(c, robot, grid);
     this._metres(c, w, h, colour);
     if (this.layers.scan && robot.scan) {
       c.fillStyle = colour("scan");
@@ -160,6 +136,7 @@ export class MapView {
       c.lineWidth = 2.5;
       this._line(c, robot.plan.poses.map(({ pose }) => [pose.position.x, pose.position.y]));
     }
+    if (this.layers.zones) station.zones.draw(this, c, colour);
     this._things(c, robot, robot.goods, 0.15, colour("goods"));
     this._things(c, robot, robot.people, 0.25, colour("people"));
     station.queue.filter((goal) => goal.state === "active" || goal.state === "waiting").forEach((goal, i) => this._flag(c, [goal.x, goal.y], goal.yaw, colour("accent"), goal.state === "active" ? "" : String(i + 1)));
@@ -167,23 +144,12 @@ export class MapView {
     if (this.drag) this._flag(c, this.world(...this.drag.from), this._heading(), colour(this.tool === "pose" ? "good" : "accent"), "");
   }
 
-  _grid(c, robot, kind) {
-    const { message, version } = robot.grids[kind];
-    const theme = document.documentElement.dataset.theme;
-    const key = `${robot.space} ${kind}`;
-    if (this._pictures.get(key)?.tag !== `${version} ${theme}`) {
-      const colours = { unknown: [...hex("--map-unknown"), 255], free: [...hex("--map-free"), 255], wall: [...hex("--map-wall"), 255], lethal: hex("--cost-lethal"), cost: hex("--cost"), zone: hex("--zone") };
-      this._pictures.set(key, { tag: `${version} ${theme}`, image: picture(message, kind, colours) });
-    }
-    const { resolution, width, height, origin } = message.info;
-    const frame = robot.frames.lookup(message.header.frame_id).pose;
-    const pose = compose(frame, poseOf(origin));
-    const [x, y] = this.pixel(pose.p);
+  _grid(c, robot, grid) {
+    const pose = compose(robot.frames.lookup(grid.frame).pose, poseOf(grid.info.origin));
     c.save();
-    c.translate(x, y);
+    c.translate(...this.pixel(pose.p));
     c.rotate(-yawOf(pose.q));
-    c.imageSmoothingEnabled = this.scale * resolution < TURNED;
-    c.drawImage(this._pictures.get(key).image, 0, -height * resolution * this.scale, width * resolution * this.scale, height * resolution * this.scale);
+    grid.paint(c, this.scale * grid.info.resolution);
     c.restore();
   }
 

@@ -6,6 +6,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import URDFLoader from "urdf";
 
 const FAR_M = 200;
+const WALL_CELLS = 600; // on a side of the map, at most
 
 export function Scene({ station, label }) {
   const canvas = useRef();
@@ -54,10 +55,14 @@ export function Scene({ station, label }) {
       }
       const robot = station.robot;
       if (robot?.scan) points.geometry.setAttribute("position", new THREE.Float32BufferAttribute(robot.scan.flat(), 3));
-      if (robot?.grids.map && wallsOf !== robot.grids.map.message) {
-        if (walls) scene.remove(walls);
-        wallsOf = robot.grids.map.message;
-        scene.add((walls = wallsFrom(wallsOf, colour("map-wall"))));
+      const map = robot?.grids.map;
+      if (map && wallsOf !== `${robot.space} ${map.version}`) {
+        const asked = (wallsOf = `${robot.space} ${map.version}`);
+        map.cells(WALL_CELLS).then((cells) => {
+          if (asked !== wallsOf) return;
+          if (walls) scene.remove(walls);
+          scene.add((walls = wallsFrom(cells, colour("map-wall"))));
+        }, () => (wallsOf = ""));
       }
       if (robot) {
         const at = new THREE.Vector3(...robot.pose.pose.p);

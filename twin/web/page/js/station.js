@@ -1,9 +1,12 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
 import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
+import { TiledGrid, WholeGrid } from "./grids.js";
+import { HISTORY, takeHistory } from "./history.js";
 
 const GRAPH_MS = 3000;
 const LOG_LINES = 300;
+const ODOMETRY = "nav_msgs/msg/Odometry";
 const GRID = "nav_msgs/msg/OccupancyGrid";
 const LEVELS = { 10: "debug", 20: "info", 30: "warn", 40: "error", 50: "fatal" };
 const GOAL = { name: "navigate_to_pose", type: "nav2_msgs/action/NavigateToPose" };
@@ -16,12 +19,18 @@ class Robot {
   constructor(space) {
     this.space = space;
     this.name = space.slice(1) || "robot";
-    this.frames = new Frames();
     this.base = "base_footprint";
+    this.grids = {}; // map, global, local, or a mask's topic -> a grid of grids.js
+    this.forget();
+  }
+
+  /** Know nothing of what was said of now: a bag goes to another time. */
+  forget() {
+    this.frames = new Frames();
     this.velocity = { linear: 0, angular: 0 };
-    this.grids = {}; // map, global, local -> {message, version}
     this.mission = []; // {state, time}
-    this.trail = [];
+    for (const name of ["scan", "plan", "goods", "people", "footprint", "battery", "spread", "joints", "guard"]) this[name] = undefined;
+    for (const [key, grid] of Object.entries(this.grids)) if (grid instanceof WholeGrid) delete this.grids[key];
   }
 
   /** {root, pose} of the base. */
@@ -44,7 +53,6 @@ export class Station extends EventTarget {
     this.control = null; // twin_msgs/Control, and own id
     this.queue = []; // {id, x, y, yaw, state: waiting | active | succeeded | canceled | failed, left}
     this.holding = false;
-    this.cameras = new Map(); // topic -> data URL
     this._goals = 0;
     this._heard = new Set();
     ros.addEventListener("connection", () => this._connection());
@@ -55,6 +63,19 @@ export class Station extends EventTarget {
 
   get robot() {
     return this.robots.get(this.selected);
+  }
+
+  /** Where something is on the server of the page; the token goes with it. */
+  address(path, query) {
+    const token = new URLSearchParams(location.search).get("token");
+    return `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
+  }
+
+  forget() {
+    this.robots.forEach((robot) => robot.forget());
+    this.log = [];
+    this.alarms.clear();
+    this.changed();
   }
 
   select(space) {
@@ -116,7 +137,8 @@ export class Station extends EventTarget {
       this.note("warn", "rosapi", error.message);
       return;
     }
-    for (const [topic, type] of this.types) this._hear(topic, type);
+    const robotsFirst = [...this.types].sort((a, b) => (b[1] === ODOMETRY) - (a[1] === ODOMETRY)); // what belongs to one finds it
+    for (const [topic, type] of robotsFirst) this._hear(topic, type);
     if (!this.robots.has(this.selected) && this.robots.size) this.selected = [...this.robots.keys()].sort()[0];
     this.changed();
   }
@@ -148,7 +170,7 @@ export class Station extends EventTarget {
       if (robot) callback(robot, msg);
     }, throttle);
 
-    if (type === "nav_msgs/msg/Odometry" && last === "odom") {
+    if (type === ODOMETRY && last === "odom") {
       const robot = this._robot(space);
       hear((msg) => {
         robot.base = msg.child_frame_id;
@@ -158,18 +180,13 @@ export class Station extends EventTarget {
     } else if (type === "tf2_msgs/msg/TFMessage" && (last === "tf" || last === "tf_static"))
       hear((msg) => this._robotsIn(space).forEach((robot) => robot.frames.take(msg)), 0);
     else if (type === GRID) {
-      const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask/.test(last) ? "zones" : "";
-      if (kind) {
-        const take = (robot, message) => (robot.grids[kind] = { message, version: (robot.grids[kind]?.version ?? 0) + 1 });
-        owned(take, kind === "map" ? 0 : 500);
-      }
-    } else if (type === "map_msgs/msg/OccupancyGridUpdate") {
-      const kind = topic.includes("global_costmap") ? "global" : topic.includes("local_costmap") ? "local" : "map";
-      owned((robot, msg) => patch(robot.grids[kind], msg));
+      const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask|^vo_map$/.test(last) ? "zones" : "";
+      if (kind) this._grid(topic, kind);
     } else if (type === "sensor_msgs/msg/LaserScan" && last === "scan") owned(takeScan, 150);
     else if (type === "nav_msgs/msg/Path" && last === "plan") owned((robot, msg) => (robot.plan = msg), 200);
     else if (type === "geometry_msgs/msg/PolygonStamped" && topic.endsWith("local_costmap/published_footprint"))
       owned((robot, msg) => (robot.footprint = msg), 200);
+    else if (type === HISTORY) hear((msg) => takeHistory(this, msg));
     else if (type === "sensor_msgs/msg/BatteryState") owned((robot, msg) => (robot.battery = msg), 1000);
     else if (type === "sensor_msgs/msg/JointState" && last === "joint_states")
       owned((robot, msg) => (robot.joints = msg), 100);
@@ -183,8 +200,6 @@ export class Station extends EventTarget {
     else if (type === "geometry_msgs/msg/PoseArray" && last === "people") owned((robot, msg) => (robot.people = msg), 200);
     else if (type === "geometry_msgs/msg/PoseWithCovarianceStamped" && last === "amcl_pose")
       owned((robot, msg) => (robot.spread = Math.sqrt(Math.max(0, msg.pose.covariance[0] + msg.pose.covariance[7]))), 200);
-    else if (type === "sensor_msgs/msg/CompressedImage")
-      hear((msg) => this.cameras.set(topic, `data:image/${/png/.test(msg.format) ? "png" : "jpeg"};base64,${msg.data}`), 200);
     else if (type === "diagnostic_msgs/msg/DiagnosticArray" && topic.endsWith("guard/status"))
       owned((robot, msg) => this._guard(robot, msg));
     else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, s.level > 0)));
@@ -198,11 +213,36 @@ export class Station extends EventTarget {
     else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
   }
 
+  /** Show a grid: in tiles if there are some; the local costmap, small and always another, whole. */
+  async _grid(topic, kind) {
+    this._heard.add(topic);
+    try {
+      const tiled = kind === "local" ? null : await TiledGrid.open(this, topic, kind);
+      if (tiled) this._owner(topic).grids[kind === "zones" ? topic : kind] = tiled; // there may be several masks
+      else this._wholeGrid(topic, kind);
+    } catch {
+      this._heard.delete(topic); // not now: it is looked again
+    }
+    this.changed();
+  }
+
+  _wholeGrid(topic, kind) {
+    const grid = new WholeGrid(kind);
+    this.ros.subscribe(topic, GRID, (message) => {
+      const robot = this._owner(topic);
+      grid.take(message);
+      if (robot) robot.grids[kind === "zones" ? topic : kind] = grid;
+      this.changed();
+    }, kind === "map" ? 0 : 500);
+    this.ros.subscribe(`${topic}_updates`, "map_msgs/msg/OccupancyGridUpdate", (update) => grid.patch(update));
+  }
+
   _robotsIn(space) {
     return [...this.robots.values()].filter((robot) => !space || robot.space === space);
   }
 
   _time({ sec, nanosec }) {
+    if (this.history) return; // which has a time of its own
     const time = sec + nanosec * 1e-9, now = performance.now() / 1000;
     const { time: before, at } = this.clock;
     const factor = before !== null && now > at ? (time - before) / (now - at) : null;
@@ -360,12 +400,4 @@ function takeScan(robot, scan) {
     points.push(place(pose, [range * Math.cos(angle), range * Math.sin(angle), 0]));
   });
   robot.scan = points;
-}
-
-function patch(grid, { x, y, width, height, data }) {
-  if (!grid || x + width > grid.message.info.width || y + height > grid.message.info.height) return;
-  for (let row = 0; row < height; row++)
-    for (let column = 0; column < width; column++)
-      grid.message.data[(y + row) * grid.message.info.width + x + column] = data[row * width + column];
-  grid.version += 1;
 }

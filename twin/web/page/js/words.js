@@ -2,6 +2,9 @@
 
 const WORDS = {
   en: {
+    past: "History", pastTime: "Time in the bag", playBag: "Play", pauseBag: "Pause",
+    zone: "Zone", hintZone: "Click the corners in order around the zone; or type them under Zones", zoneAdd: "Keep out", zoneUndo: "Undo corner", zoneRemove: "Remove", zoneSure: "Really remove?", zoneNone: "No zones drawn", noZones: "This robot takes no zones",
+    zoneLabel: "Corners, an x and a y [m] in each line", zoneCorners: "corners", zoneFew: "A zone needs three corners or more.", zoneNumbers: "Each line needs two numbers, x and y.", zoneCrosses: "Its edges cross: give the corners in order around the zone.", zoneRefused: "The robot refuses this zone; the log says why.",
     title: "Operator", connected: "Connected", disconnected: "No connection", silent: "silent for", stop: "Emergency stop", stopShort: "STOP",
     stopped: "Stopped by", stopping: "Stopping …", release: "Release", releaseAsk: "Release the emergency stop?", releaseText: "The robot may move as soon as it is commanded. Make sure that nobody is near it.",
     cancel: "Cancel", noStop: "This robot tells of no emergency stop", robot: "Robot", map: "Map", view3d: "3D", drive: "Drive", tasks: "Tasks", alarms: "Alarms", log: "Log", plot: "Plot", camera: "Camera",
@@ -17,6 +20,9 @@ const WORDS = {
     hintGoal: "Click where to go; drag for the heading", hintPose: "Click where the robot is; drag for its heading", hintWaypoint: "Click to add a goal to the queue; drag for the heading", panels: "Panels", tools: "Tools of the map", history: "Steps",
   },
   zh: {
+    past: "历史回放", pastTime: "录包时间", playBag: "播放", pauseBag: "暂停",
+    zone: "禁区", hintZone: "沿禁区边界依次点击各角点，也可在“区域”面板输入", zoneAdd: "设为禁区", zoneUndo: "撤销角点", zoneRemove: "删除", zoneSure: "确认删除？", zoneNone: "没有绘制的禁区", noZones: "该机器人不接收禁区",
+    zoneLabel: "角点，每行一个 x 和 y [米]", zoneCorners: "个角点", zoneFew: "禁区至少需要三个角点。", zoneNumbers: "每行需要 x 和 y 两个数字。", zoneCrosses: "边线交叉：请沿边界依次给出角点。", zoneRefused: "机器人拒绝了该禁区，原因见日志。",
     title: "操作台", connected: "已连接", disconnected: "连接中断", silent: "无消息", stop: "紧急停止", stopShort: "急停",
     stopped: "急停操作者：", stopping: "正在停止 …", release: "解除", releaseAsk: "解除紧急停止？", releaseText: "解除后机器人收到指令即会移动。请确认附近无人。",
     cancel: "取消", noStop: "该机器人未提供紧急停止", robot: "机器人", map: "地图", view3d: "三维", drive: "驾驶", tasks: "任务", alarms: "报警", log: "日志", plot: "曲线", camera: "相机",

@@ -1,0 +1,1 @@
+"""What clients without a websocket are given: pictures of cameras, and tiles of maps."""
