@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from twin.geometry import Pose3
 from twin.models.lens import Lens
+from twin.models.wide_lens import WideLens
 from twin.periods import Period, period_of
 from twin.plugins import Plugin
 
@@ -166,11 +167,13 @@ class CameraSpec(SensorSpec):
     depth_noise: DepthNoise | None = None
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """Of `Lens`."""
+    wide: WideLens | None = None
+    """The lens of a wide-angle camera."""
 
     @property
-    def lens(self) -> Lens:
+    def lens(self) -> Lens | WideLens:
         """How it projects."""
-        return Lens(
+        return self.wide or Lens(
             width=self.width,
             height=self.height,
             horizontal_fov=self.horizontal_fov,
