@@ -13,7 +13,7 @@ from twin.models.checks import check
 from twin.models.lens import Lens
 from twin.models.loader import parse_urdf
 from twin.models.optical_frames import optical_frame
-from twin.models.specs import CameraSpec, CameraTopics, DepthNoise
+from twin.models.specs import CameraSpec, CameraTopics, DepthNoise, Exposure
 
 
 def camera(inside: str = "", *, kind: str = "camera", after: str = "", more: str = "") -> CameraSpec:
@@ -83,6 +83,9 @@ def test_what_it_makes() -> None:
     assert camera("<noise><mean>0.1</mean><stddev>0.2</stddev></noise>").noise_mean == 0.1
     noise = "<depth_camera><noise><type>realsense</type><baseline>0.1</baseline></noise></depth_camera>"
     assert camera(noise, kind="rgbd").depth_noise == DepthNoise(model="realsense", baseline=0.1)
+    dark = "<exposure><type>auto</type><target>0.3</target><lag>1</lag></exposure>"
+    assert camera(dark).exposure == Exposure(target=0.3, lag=1.0)
+    assert camera("<exposure><gain>2</gain></exposure>").exposure == Exposure(gain=2.0)
     lens = "<distortion><k1>1</k1><k2>2</k2><k3>3</k3><p1>4</p1><p2>5</p2></distortion>"
     assert camera(lens).distortion == (1.0, 2.0, 4.0, 5.0, 3.0)
 
@@ -103,6 +106,10 @@ WIDE = "wideanglecamera"
             "depth",
             "depth noise of type 'stereo'; valid are none, realsense and kinect",
         ),
+        ("<exposure><type>iso</type></exposure>", "camera", "an exposure of type 'iso'; valid are"),
+        ("<exposure><gain>0</gain></exposure>", "camera", "an exposure that cannot be; valid are gain and"),
+        ("<exposure type='auto'><target>1</target></exposure>", "camera", "max_gain, 0 < target < 1"),
+        ("<exposure><lag>-1</lag></exposure>", "camera", "an exposure whose lag or read_noise is negative"),
         ("<image><width>20000</width></image>", WIDE, "an image of 20000 x 240 pixels"),
         ("<lens><type>fish</type></lens>", WIDE, "a <lens> of type 'fish'; valid are gnomonical,"),
         (

@@ -40,11 +40,14 @@ class Source:
         """Of each view [pixels]."""
         self.turns: tuple[Pose3, ...] = (_AHEAD,)
         """Where the views look, from the camera's frame, which looks along +x."""
+        self.lit = 1.0
+        """Which part of the image shows something, from 0 to 1."""
         self._is_same = isinstance(lens, Lens) and not lens.is_distorted
         if self._is_same:
             return
         view, at = self._on_cube(lens) if isinstance(lens, WideLens) else self._on_plane(lens)
         self._unseen = ~((at >= 0.0) & (at <= np.array(self.size) - 1)).all(axis=-1)
+        self.lit = max(1.0 - float(self._unseen.mean()), 1.0 / self._unseen.size)
         at[self._unseen] = 0.0
         width, height = self.size
         u, v = np.rint(at).astype(np.intp).transpose(2, 0, 1)
