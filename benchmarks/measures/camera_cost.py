@@ -69,7 +69,7 @@ def main() -> None:
                     renderer.enable_depth_rendering()
 
                 def bare(renderer: mujoco.Renderer = renderer, data: mujoco.MjData = data) -> None:
-                    renderer.update_scene(data, "camera 0")
+                    renderer.update_scene(data, "camera 0.0")
                     for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
                         renderer.scene.flags[flag] = 0
                     renderer.render()

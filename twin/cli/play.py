@@ -40,6 +40,8 @@ def play(
     from twin.recording import player
 
     file = find_recording(recording)
+    if not web and (lacking := player.unshown(file)):
+        stderr().print(lacking, markup=False)
     if screenshot is not None:
         check_file(screenshot, "--screenshot")
         player.screenshot(file, screenshot, time_s=at, view=view)

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 
 from twin.convert.bodies import free_name
-from twin.geometry import Array, multiply_wxyz
+from twin.geometry import Array, Pose3, multiply_wxyz
 from twin.models.description import RobotDescription
 from twin.models.sensors import plugin_of
 from twin.models.specs import CameraSpec, SensorSpec
@@ -91,7 +91,8 @@ class SensorBuilder:
 
     def _camera(self, camera: CameraSpec) -> str:
         name = self._free(camera.name)
-        add_camera(self.spec.body(camera.link), name, camera)
+        size = camera.width, camera.height
+        add_camera(self.spec.body(camera.link), name, camera.T_link_sensor, size, camera.lens.focal_length)
         return name
 
     def _free(self, name: str) -> str:
@@ -102,24 +103,23 @@ class SensorBuilder:
 
 
 def add_camera(
-    body: mujoco.MjsBody, name: str, camera: CameraSpec, resolution: tuple[int, int] | None = None
+    body: mujoco.MjsBody, name: str, pose: Pose3, size: tuple[int, int], focal_length: float
 ) -> None:
-    """Add a camera to the body of its link.
+    """Add a pinhole camera to the body of its link.
 
     Args:
         body: Of the link.
         name: In the model.
-        camera: Its pose and, for a given resolution, its focal length count.
-        resolution: Width and height [pixels] if they are not the camera's own.
+        pose: In the link; it looks along +x.
+        size: Width and height of its image [pixels].
+        focal_length: [pixels]
     """
-    width, height = resolution or (camera.width, camera.height)
-    pose = camera.T_link_sensor
     body.add_camera(
         name=name,
         pos=pose.xyz,
         quat=multiply_wxyz(pose.quat_wxyz, LENS_ALONG_X),
-        fovy=math.degrees(2.0 * math.atan(height / 2.0 / camera.lens.focal_length)),
-        resolution=[width, height],
+        fovy=math.degrees(2.0 * math.atan(size[1] / 2.0 / focal_length)),
+        resolution=size,
     )
 
 

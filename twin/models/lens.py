@@ -49,6 +49,11 @@ class Lens:
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
 
     @property
+    def model(self) -> tuple[str, tuple[float, ...]]:
+        """CameraInfo's distortion model and D."""
+        return "plumb_bob", self.distortion
+
+    @property
     def is_distorted(self) -> bool:
         """Whether straight lines are bent."""
         return any(self.distortion)

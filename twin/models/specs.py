@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from twin.geometry import Pose3
 from twin.models.lens import Lens
+from twin.models.wide_lens import WideLens
 from twin.periods import Period, period_of
 from twin.plugins import Plugin
 
@@ -133,6 +134,26 @@ class DepthNoise:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Exposure:
+    """How brightly a camera takes its pictures."""
+
+    gain: float = 1.0
+    """By what a picture is brighter than it is drawn, if that is fixed."""
+    target: float | None = None
+    """Mean brightness that automatic exposure steers to, from 0 to 1; None: the gain is fixed."""
+    lag: float = 0.3
+    """Time constant with which its gain follows the light [s]."""
+    min_gain: float = 0.125
+    """Its least one."""
+    max_gain: float = 8.0
+    """Its largest one."""
+    full_well: float = 10_000.0
+    """Electrons in a pixel that is 255 with a gain of 1; their square root is its shot noise."""
+    read_noise: float = 5.0
+    """Standard deviation of what reading adds [electrons]."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CameraSpec(SensorSpec):
     """A camera that looks along +x of its link with +z up, as Gazebo's do."""
 
@@ -166,11 +187,15 @@ class CameraSpec(SensorSpec):
     depth_noise: DepthNoise | None = None
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """Of `Lens`."""
+    exposure: Exposure | None = None
+    """None: pictures are as bright as they are drawn."""
+    wide: WideLens | None = None
+    """The lens of a wide-angle camera."""
 
     @property
-    def lens(self) -> Lens:
+    def lens(self) -> Lens | WideLens:
         """How it projects."""
-        return Lens(
+        return self.wide or Lens(
             width=self.width,
             height=self.height,
             horizontal_fov=self.horizontal_fov,

@@ -114,7 +114,7 @@ component = cache(Component)
 
 
 def _arrow(values: Any, kind: pa.DataType) -> pa.Array:
-    if pa.types.is_primitive(kind):
+    if pa.types.is_primitive(kind) and not pa.types.is_boolean(kind):  # which are bits
         return _numbers(values, kind.to_pandas_dtype(), kind)
     if pa.types.is_fixed_size_list(kind):
         items = _arrow(values, kind.value_type)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from twin.geometry import Pose3
 from twin.models.lens import Lens
+from twin.models.wide_lens import WideLens
 
 
 class Mounted(NamedTuple):
@@ -14,4 +15,4 @@ class Mounted(NamedTuple):
     body: str
     """The frame of the recording that it is fixed to."""
     T_body_optical: Pose3
-    lens: Lens
+    lens: Lens | WideLens

@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 from twin.errors import RecordingError
 from twin.files.writing import write_whole
-from twin.recording.read_back import check_recording
+from twin.recording.read_back import check_recording, has_video
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -90,6 +91,19 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
         except ConnectionError as fault:
             raise RecordingError(f"the view {view!r} is behind another tab, and not drawn") from fault
     write_whole(png, picture)
+
+
+def unshown(path: Path) -> str:
+    """Return what the viewer shows of a recording on another computer, not on this one; empty if nothing.
+
+    Rerun's own decodes no H.264, but has a program of that name do it; a browser does.
+
+    Raises:
+        RecordingError: No such recording.
+    """
+    if which("ffmpeg") is not None or not has_video(path):
+        return ""
+    return "the pictures are a video, which the viewer has ffmpeg decode: `apt-get install ffmpeg`, or --web"
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 
 from twin.errors import RecordingError, nearest
 from twin.files.reading import open_file
+
+if TYPE_CHECKING:
+    import rerun.chunk as rc
 
 MAGIC = (b"RRF2", b"RRIO")
 """First bytes of a Rerun recording."""
@@ -153,19 +156,8 @@ def read(path: Path) -> Recording:
     Raises:
         RecordingError: The file is missing, not a recording or empty.
     """
-    import rerun.chunk as rc
-    from rerun.error_utils import RerunWarning
-
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # it needs none
-        reader = rc.RrdReader(check_recording(path))
-    try:
-        stores = reader.recordings()
-    except RuntimeError as fault:
-        raise RecordingError(f"{path}: the recording is damaged: {fault}") from fault
-    if not stores:
-        raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")
-    store = stores[0]
+    reader = _reader(path)
+    store = _stores(reader, path)[0]
     timelines: set[str] = set()
     parts: dict[tuple[str, str], list[_Part]] = {}
     for chunk in reader.stream(store=store):
@@ -181,6 +173,18 @@ def read(path: Path) -> Recording:
         timelines=frozenset(timelines),
         columns=columns,
     )
+
+
+def has_video(path: Path) -> bool:
+    """Tell whether any pictures of a recording are a video.
+
+    Raises:
+        RecordingError: See `read`.
+    """
+    reader = _reader(path)
+    streams = (reader.stream(store=store) for store in _stores(reader, path))
+    codecs = (stream.filter(is_static=True, components="VideoStream:codec") for stream in streams)
+    return any(not chunk.is_empty for stream in codecs for chunk in stream)
 
 
 def content_digest(path: Path) -> str:
@@ -201,6 +205,25 @@ def content_digest(path: Path) -> str:
             digest.update(column.times_ns.tobytes())
             _hash_array(digest, column.array)
     return digest.hexdigest()
+
+
+def _reader(path: Path) -> rc.RrdReader:
+    import rerun.chunk as rc
+    from rerun.error_utils import RerunWarning
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)  # it needs none
+        return rc.RrdReader(check_recording(path))
+
+
+def _stores(reader: rc.RrdReader, path: Path) -> list[Any]:
+    try:
+        stores = list(reader.recordings())
+    except RuntimeError as fault:
+        raise RecordingError(f"{path}: the recording is damaged: {fault}") from fault
+    if not stores:
+        raise RecordingError(f"{path}: holds no recording; the run ended before it wrote anything")
+    return stores
 
 
 def _unit(entity: str, component: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic_ns
 from types import MappingProxyType, SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from twin.errors import RecordingError
 from twin.periods import next_due, period_of
@@ -75,6 +75,8 @@ class RecordingConfig:
     """Of a particle cloud."""
     images_hz: float = 1.0
     """Rate of the pictures of each camera; 0 keeps none."""
+    images: Literal["jpeg", "h264"] = "jpeg"
+    """As what they are kept: each by itself, or as a video."""
 
     def __post_init__(self) -> None:
         problems = [
@@ -113,9 +115,16 @@ class RerunSink:
             config: What to keep.
             screen: Shows the recording while it is made; the run never waits for it.
             recording_id: Fixed by the caller, so that two equal runs write equal recordings.
+
+        Raises:
+            RecordingError: Pictures are to be a video, and PyAV is not installed.
         """
         self._target = target
         self._config = config or RecordingConfig()
+        if self._config.images == "h264":
+            from twin.recording.channels.video import check_installed
+
+            check_installed()
         self._recording_id = recording_id
         self._screen = screen
         self._world: World | None = None
@@ -193,6 +202,7 @@ class RerunSink:
             wheels=wheels,
             cameras=cameras,
             images_period=self._images_period,
+            images=self._config.images,
         )
         declare_frames(self._recording, frames)
         self._set_stage()

@@ -455,13 +455,14 @@ def _recording(scenario: Scenario, out: Path | None, screen: LiveScreen | None) 
     from twin.recording.live_screen import LATE_S
     from twin.recording.sink import RecordingConfig, RerunSink
 
-    rates = {name: getattr(scenario.recording, name) for name in ("poses_hz", "images_hz")}
+    wish = scenario.recording
+    kept_as: dict[str, Any] = {name: getattr(wish, name) for name in ("poses_hz", "images_hz", "images")}
     name = f"{scenario.name}-{scenario.seed}"
-    live = RecordingConfig(**rates, loss_s=LATE_S)
+    live = RecordingConfig(**kept_as, loss_s=LATE_S)
     file = out / f"{scenario.name}.rrd" if out is not None and kept else None
     if file is None:
         name = f"{name}-{uuid.uuid4()}"  # each is a recording of its own, which the viewer turns to
-    config = live if screen is not None else RecordingConfig(**rates)
+    config = live if screen is not None else RecordingConfig(**kept_as)
     return RerunSink(file, config=config, recording_id=name, screen=screen)
 
 

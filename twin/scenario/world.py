@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -137,3 +137,5 @@ class RecordingConfig(StrictModel):
     """Rate of the poses [Hz], at most one per control period."""
     images_hz: Annotated[Hertz, NotNegative] = 1.0
     """Rate of the pictures of each camera [Hz], at most the camera's; 0: none."""
+    images: Literal["jpeg", "h264"] = "jpeg"
+    """As what they are kept: each by itself, or [as a video](recording.md#video)."""

@@ -310,7 +310,8 @@ class World:
         """
         from twin.sim.cameras.eyes import Eyes
 
-        return Eyes(self, self.spec_to_see(), [camera for camera in self._cameras if not camera.spec.truth])
+        cameras = [camera for camera in self._cameras if not camera.spec.truth]
+        return Eyes(self, self.spec_to_see(), cameras).introduce()
 
     @cached_property
     def true_eyes(self) -> TrueEyes:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from twin.errors import ModelError
+from twin.models.checks import check
 from twin.models.lens import Lens
 from twin.models.loader import parse_urdf
 from twin.models.optical_frames import optical_frame
-from twin.models.specs import CameraSpec, CameraTopics, DepthNoise
+from twin.models.specs import CameraSpec, CameraTopics, DepthNoise, Exposure
 
 
 def camera(inside: str = "", *, kind: str = "camera", after: str = "", more: str = "") -> CameraSpec:
@@ -81,8 +83,14 @@ def test_what_it_makes() -> None:
     assert camera("<noise><mean>0.1</mean><stddev>0.2</stddev></noise>").noise_mean == 0.1
     noise = "<depth_camera><noise><type>realsense</type><baseline>0.1</baseline></noise></depth_camera>"
     assert camera(noise, kind="rgbd").depth_noise == DepthNoise(model="realsense", baseline=0.1)
+    dark = "<exposure><type>auto</type><target>0.3</target><lag>1</lag></exposure>"
+    assert camera(dark).exposure == Exposure(target=0.3, lag=1.0)
+    assert camera("<exposure><gain>2</gain></exposure>").exposure == Exposure(gain=2.0)
     lens = "<distortion><k1>1</k1><k2>2</k2><k3>3</k3><p1>4</p1><p2>5</p2></distortion>"
     assert camera(lens).distortion == (1.0, 2.0, 4.0, 5.0, 3.0)
+
+
+WIDE = "wideanglecamera"
 
 
 @pytest.mark.parametrize(
@@ -98,6 +106,25 @@ def test_what_it_makes() -> None:
             "depth",
             "depth noise of type 'stereo'; valid are none, realsense and kinect",
         ),
+        ("<exposure><type>iso</type></exposure>", "camera", "an exposure of type 'iso'; valid are"),
+        ("<exposure><gain>0</gain></exposure>", "camera", "an exposure that cannot be; valid are gain and"),
+        ("<exposure type='auto'><target>1</target></exposure>", "camera", "max_gain, 0 < target < 1"),
+        ("<exposure><lag>-1</lag></exposure>", "camera", "an exposure whose lag or read_noise is negative"),
+        ("<image><width>20000</width></image>", WIDE, "an image of 20000 x 240 pixels"),
+        ("<lens><type>fish</type></lens>", WIDE, "a <lens> of type 'fish'; valid are gnomonical,"),
+        (
+            "<lens><type>custom</type><custom_function><fun>cos</fun></custom_function></lens>",
+            WIDE,
+            "a <lens> whose <fun> is 'cos'; valid are sin, tan, id",
+        ),
+        (
+            "<lens><type>custom</type><custom_function><c2>0</c2></custom_function></lens>",
+            WIDE,
+            "a <lens> whose function does not grow; c1, c2 and f are positive",
+        ),
+        ("<lens><cutoff_angle>4</cutoff_angle></lens>", WIDE, "a <cutoff_angle> of 4 rad; valid is more"),
+        ("<lens><env_texture_size>1</env_texture_size></lens>", WIDE, "an <env_texture_size> of 1; valid"),
+        ("<lens><intrinsics><fx>9</fx></intrinsics></lens>", WIDE, "<intrinsics> with fx and fy not both"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_its_line(inside: str, kind: str, says: str) -> None:
@@ -138,3 +165,83 @@ def test_a_lens_undoes_what_it_does() -> None:
     columns, rows = np.meshgrid(np.arange(64), np.arange(48))
     assert np.abs(pixels - np.column_stack((columns.ravel(), rows.ravel()))).max() < 1e-5
     assert np.allclose(lens.project(np.array([[0.0, 0.0, 2.0]])), [[31.5, 23.5]])
+
+
+FISHEYE = "<horizontal_fov>{fov}</horizontal_fov><lens><type>{kind}</type>{more}</lens>"
+CUSTOM = "<custom_function><c1>2</c1><c2>3</c2><c3>0.1</c3><f>1.5</f><fun>sin</fun></custom_function>"
+
+
+@pytest.mark.parametrize(
+    ("kind", "fov", "at"),
+    [
+        ("gnomonical", 2.0, lambda angle: np.tan(angle) / np.tan(1.0)),
+        ("stereographic", 5.0, lambda angle: np.tan(angle / 2) / np.tan(1.25)),
+        ("equidistant", 6.28318, lambda angle: angle / np.pi),
+        ("equisolid_angle", 4.0, lambda angle: np.sin(angle / 2) / np.sin(1.0)),
+        ("orthographic", 3.1416, np.sin),
+        ("custom", 3.0, lambda angle: np.sin(angle / 3 + 0.1) / np.sin(0.6)),
+    ],
+)
+def test_wide_lenses_map_angles_as_sdformat_says(kind: str, fov: float, at: Any) -> None:
+    more = f"<cutoff_angle>3.1416</cutoff_angle>{CUSTOM if kind == 'custom' else ''}"
+    lens = camera(FISHEYE.format(fov=fov, kind=kind, more=more), kind=WIDE).lens
+    angle = np.linspace(0.1, fov / 2 - 0.02, 9)
+    seen = lens.project(np.column_stack((np.sin(angle), np.zeros(9), np.cos(angle))))
+    assert seen == pytest.approx(np.column_stack((159.5 + 160 * at(angle), np.full(9, 119.5))), abs=1e-2)
+
+
+@pytest.mark.parametrize("kind", ["stereographic", "equidistant", "equisolid_angle", "orthographic"])
+def test_camera_info_of_a_wide_lens_is_opencvs_fisheye(kind: str) -> None:
+    """OpenCV's model is of what is before the camera."""
+    cv2 = pytest.importorskip("cv2")
+    lens = camera(FISHEYE.format(fov=3.1, kind=kind, more=""), kind=WIDE).lens
+    name, d = lens.model
+    assert (name, len(d)) == ("equidistant", 4)
+    if kind == "equidistant":
+        assert d == (0.0, 0.0, 0.0, 0.0)
+    points = np.random.default_rng(0).normal(size=(200, 3)) * (1.0, 1.0, 0.0) + (0.0, 0.0, 0.6)
+    still = np.zeros((3, 1))
+    theirs, _ = cv2.fisheye.projectPoints(points[:, None], still, still, lens.matrix, np.array(d))
+    assert np.abs(theirs[:, 0] - lens.project(points)).max() < 1e-3
+
+
+def test_a_lens_with_intrinsics_or_a_scale_of_its_own_leaves_the_field_of_view() -> None:
+    more = "<intrinsics><fx>90</fx><fy>80</fy><cx>150</cx><cy>110</cy></intrinsics>"
+    lens = camera(FISHEYE.format(fov=1, kind="equidistant", more=more), kind=WIDE).lens
+    assert lens.matrix.tolist() == [[90, 0, 150], [0, 80, 110], [0, 0, 1]]
+    more = f"<scale_to_hfov>false</scale_to_hfov>{CUSTOM}"
+    lens = camera(FISHEYE.format(fov=1, kind="custom", more=more), kind=WIDE).lens
+    seen = lens.project(np.array([[np.sin(0.5), 0.0, np.cos(0.5)]]))
+    assert seen == pytest.approx(np.array([[159.5 + 160 * 2 * 1.5 * np.sin(0.5 / 3 + 0.1), 119.5]]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "fov", "most"),
+    [("equidistant", 6.4, "6.283"), ("equidistant", 0.0, "6.283"), ("orthographic", 3.2, "3.142")],
+)
+def test_a_field_of_view_that_a_wide_lens_has_not_is_told(kind: str, fov: float, most: str) -> None:
+    inside = FISHEYE.format(fov=fov, kind=kind, more="")
+    text = (
+        "<robot name='r'><link name='a'/><gazebo reference='a'><sensor name='eye' type='wideanglecamera'>"
+        f"<camera>{inside}</camera></sensor></gazebo></robot>"
+    )
+    description = parse_urdf(text, Path("r.urdf"))
+    assert description.cameras == ()
+    told = [found.message for found in check(description) if "horizontal_fov" in found.message]
+    assert told == [
+        f"sensor 'eye' of type wideanglecamera: horizontal_fov {fov:g} rad; "
+        f"a wide-angle camera of this lens has more than 0, at most {most}"
+    ]
+
+
+def test_a_wide_lens_undoes_what_it_does() -> None:
+    lens = camera(
+        FISHEYE.format(fov=4, kind="equisolid_angle", more="<cutoff_angle>2.2</cutoff_angle>"), kind=WIDE
+    ).lens
+    seen = lens.directions().reshape(-1, 3)
+    columns, rows = np.meshgrid(np.arange(320), np.arange(240))
+    pixels = np.column_stack((columns.ravel(), rows.ravel()))
+    shown = np.isfinite(seen[:, 0])
+    assert shown.mean() > 0.7
+    assert np.abs(lens.project(seen) - pixels)[shown].max() < 1e-9
+    assert np.nanmin(seen[:, 2]) == pytest.approx(np.cos(2.2), abs=0.01)

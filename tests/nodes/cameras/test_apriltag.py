@@ -122,6 +122,19 @@ def test_the_tag_of_a_dock_is_told_to_the_docking_server(bench: Bench) -> None:
     assert pose3_from_pose(dock.pose).xyz[2] == pytest.approx(DEPTH, abs=0.002)
 
 
+def test_images_of_a_wide_angle_lens_are_refused_in_a_sentence(bench: Bench) -> None:
+    logs = bench.logs()
+    eye = Eye(bench, node_config())
+    image = eye.image()
+    eye._image.publish(image)
+    eye._info.publish(
+        new(CameraInfo, header=image.header, k=LENS.matrix.ravel(), distortion_model="equidistant")
+    )
+    bench.run(0.1)
+    assert eye.detections == []
+    assert logs == ["cannot find tags in images of a wide-angle lens, of 320 x 240"]
+
+
 def test_images_that_cannot_be_read_are_told_once(bench: Bench) -> None:
     logs = bench.logs()
     eye = Eye(bench, node_config())

@@ -24,9 +24,9 @@ URDF = """<robot name="mast"><link name="base">
 <inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1"/></inertial>
 <collision><geometry><box size=".1 .1 .1"/></geometry></collision></link>
 <gazebo reference="base"><sensor name="camera" type="{kind}"><pose>0.06 0 0.5 0 0 0</pose>
-<update_rate>{rate}</update_rate><camera><horizontal_fov>1.2</horizontal_fov>
+<update_rate>{rate}</update_rate><camera>{inside}<horizontal_fov>1.2</horizontal_fov>
 <image><width>160</width><height>120</height><format>{format}</format></image>
-<clip><near>0.05</near><far>20</far></clip>{inside}</camera></sensor></gazebo></robot>"""
+<clip><near>0.05</near><far>20</far></clip></camera></sensor></gazebo></robot>"""
 
 Look = Callable[..., Camera]
 WALL = StaticBody(

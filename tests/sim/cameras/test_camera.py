@@ -14,13 +14,24 @@ import pytest
 
 from tests.drawing import needs_opengl
 from tests.sim.cameras.conftest import BALL, BALL_AT, BALL_RADIUS, EYE, WALL, Look
+from twin.bridge.msgs import Header, new
 from twin.errors import ModelError
 from twin.geometry import Pose3
-from twin.models.shapes import Box
+from twin.models.shapes import Box, Sphere
+from twin.nodes.cameras.messages import camera_info
 from twin.sim.scene import Shape, StaticBody
 
 pytestmark = needs_opengl
+SMALL = 0.12
 LENS = "<distortion><k1>-0.25</k1><k2>0.1</k2><k3>0.01</k3><p1>0.002</p1><p2>-0.001</p2></distortion>"
+
+
+def wide(kind: str, fov: float, cutoff: str = "<cutoff_angle>3.1416</cutoff_angle>") -> str:
+    """Return what a wide-angle camera has inside; it makes pictures of 480 x 480 pixels."""
+    return (
+        f"<lens><type>{kind}</type>{cutoff}<env_texture_size>512</env_texture_size></lens>"
+        f"<horizontal_fov>{fov}</horizontal_fov><image><width>480</width><height>480</height></image>"
+    )
 
 
 def outline(centre: np.ndarray, radius: float) -> np.ndarray:
@@ -66,6 +77,69 @@ def test_a_ball_is_seen_where_the_camera_info_says(camera_at: Look, inside: str)
         outline(np.array([-left, -up, ahead]), BALL_RADIUS), lens.matrix, lens.distortion
     )
     assert np.abs(np.array([u.mean(), v.mean()]) - middle(edge)).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    ("kind", "fov", "angles"),
+    [
+        ("equidistant", 6.28, (0.0, 0.79, 1.4, 2.4)),  # 0.79: on two faces of the cube
+        ("stereographic", 5.0, (0.0, 0.79, 1.4, 2.2)),
+        ("equisolid_angle", 6.28, (0.0, 0.79, 1.4, 2.4)),
+        ("orthographic", 3.14, (0.0, 0.79, 1.3)),
+        ("gnomonical", 2.6, (0.0, 0.79, 1.1)),
+    ],
+)
+def test_balls_are_seen_where_a_wide_lens_says(
+    camera_at: Look, kind: str, fov: float, angles: tuple[float, ...]
+) -> None:
+    ways = [np.array([np.cos(angle), np.sin(angle) * 0.96, np.sin(angle) * 0.28]) for angle in angles]
+    red_ball = (Shape(geometry=Sphere(radius=SMALL), rgba=(1.0, 0.0, 0.0, 1.0)),)
+    balls = [
+        StaticBody(name=f"ball {i}", T_world_body=Pose3.from_xyz_rpy(EYE + 2.0 * way), shapes=red_ball)
+        for i, way in enumerate(ways)
+    ]
+    camera = camera_at(*balls, kind="wideanglecamera", inside=wide(kind, fov))
+    image = camera.look(0).colours
+    assert image is not None
+    red = (image[..., 0].astype(int) - image[..., 1]) > 60
+    for x, y, z in ways:
+        seen = camera.spec.lens.project(outline(2.0 * np.array([-y, -z, x]), SMALL))
+        (left, top), (right, bottom) = np.floor(seen.min(axis=0)) - 2, np.ceil(seen.max(axis=0)) + 3
+        v, u = np.nonzero(red[int(top) : int(bottom), int(left) : int(right)])
+        assert len(u) > 10
+        assert np.abs(np.array([u.mean() + left, v.mean() + top]) - middle(seen)).max() < 0.2
+
+
+def test_opencv_finds_what_an_equidistant_lens_shows(camera_at: Look) -> None:
+    cv2 = pytest.importorskip("cv2")
+    camera = camera_at(BALL, kind="wideanglecamera", inside=wide("equidistant", 3.14))
+    info = camera_info(new(Header), camera.spec.lens)
+    assert info.distortion_model == "equidistant"
+    image = camera.look(0).colours
+    assert image is not None
+    v, u = np.nonzero((image[..., 0].astype(int) - image[..., 1]) > 60)
+    ahead, left, up = np.array(BALL_AT) - EYE
+    points, still = outline(np.array([-left, -up, ahead]), BALL_RADIUS)[:, None], np.zeros((3, 1))
+    edge, _ = cv2.fisheye.projectPoints(points, still, still, info.k.reshape(3, 3), info.d)
+    assert np.abs(np.array([u.mean(), v.mean()]) - middle(edge[:, 0])).max() < 0.2
+
+
+def test_a_wide_picture_has_no_seams_and_ends_at_the_cutoff(camera_at: Look) -> None:
+    inside = wide("equidistant", 3.14, "<cutoff_angle>1.2</cutoff_angle>")
+    camera = camera_at(WALL, kind="wideanglecamera", inside=inside)
+    assert len(camera.source.turns) == 5
+    image = camera.look(0).colours
+    assert image is not None
+    angle = np.arccos(camera.spec.lens.directions()[..., 2])
+    assert (image[np.isnan(angle)] == 0).all()
+    assert (image[~np.isnan(angle)] > 0).all()
+    assert np.nanmax(angle) == pytest.approx(1.2, abs=0.02)
+    wall = image[200:210, 100:380].astype(int)  # of which one part is seen ahead, two are seen beside
+    assert np.ptp(wall.reshape(-1, 3), axis=0).max() <= 1
+
+
+def test_a_narrow_wide_lens_draws_one_view(camera_at: Look) -> None:
+    assert len(camera_at(kind="wideanglecamera", inside=wide("equidistant", 1.0)).source.turns) == 1
 
 
 def test_the_depth_of_a_wall_is_what_rays_measure(camera_at: Look) -> None:

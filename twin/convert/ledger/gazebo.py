@@ -68,6 +68,8 @@ def sensor_fate(element: Element, sensor: Element, link: str, description: Robot
     own = OF_CAMERAS.get(path) if cls is None else cls.fate(path, element, sensor)
     if own is None and len(element) and path not in TAGS:
         return container_fate(element, lambda child: sensor_fate(child, sensor, link, description))
+    if camera and path.startswith("lens/"):
+        return "dropped", f"MuJoCo's cameras are pinholes; {ELSEWHERE}"
     if camera and path.startswith("noise"):
         return "dropped", f"MuJoCo's images are free of noise; {ELSEWHERE}"
     plugin = path.startswith("plugin")

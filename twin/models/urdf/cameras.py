@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 from twin.models.description import Link
-from twin.models.specs import CameraSpec, CameraTopics, DepthNoise
+from twin.models.specs import CameraSpec, CameraTopics, DepthNoise, Exposure
 from twin.models.urdf.document import Element, Report, first, text_of
 from twin.models.urdf.gazebo import number_in
 from twin.models.urdf.sensors import (
@@ -21,13 +21,15 @@ from twin.models.urdf.sensors import (
     sensor_elements,
     unique_name,
 )
+from twin.models.urdf.wide_lenses import fov_fault, read_wide_lens
 
 _COLOUR, _DEPTH = 1, 2
+_WIDE = "wideanglecamera"
 _SEES: Mapping[str, int] = MappingProxyType(
     {
         "camera": _COLOUR,
         "multicamera": _COLOUR,
-        "wideanglecamera": _COLOUR,
+        _WIDE: _COLOUR,
         "depth": _COLOUR | _DEPTH,
         "depth_camera": _DEPTH,
         "rgbd": _COLOUR | _DEPTH,
@@ -39,7 +41,7 @@ _SEES: Mapping[str, int] = MappingProxyType(
     }
 )
 CAMERA = tuple(_SEES)
-"""Types whose image a pinhole camera makes."""
+"""Types that are cameras."""
 _Truth: TypeAlias = Literal["semantic", "instance", "boxes"]
 _TRUTHS: Mapping[str, tuple[str, Mapping[str, _Truth]]] = MappingProxyType(
     {
@@ -84,7 +86,7 @@ _WIDEST = math.pi - 1e-3
 def read_cameras(
     root: Element, links: Mapping[str, Link], report: Report, *, taken: Collection[str]
 ) -> tuple[CameraSpec, ...]:
-    """Return the cameras in file order; those that no pinhole camera can be are left out.
+    """Return the cameras in file order; those with an impossible field of view are left out.
 
     Args:
         root: The `<robot>`.
@@ -121,8 +123,10 @@ def lenses(sensor: Element) -> Iterator[tuple[str, Element]]:
 
 
 def camera_fault(camera: Element) -> str:
-    """Return why a `<camera>` is no pinhole camera; empty if it is one."""
-    fov = _number(camera, "horizontal_fov")
+    """Return why a `<camera>` of a sensor is none; empty if it is one."""
+    fov, sensor = _number(camera, "horizontal_fov"), camera.getparent()
+    if sensor is not None and kind_of(sensor) == _WIDE:
+        return fov_fault(camera, fov)
     if not 0.0 < fov < _WIDEST:
         return f"horizontal_fov {fov:g} rad; a pinhole camera has less than pi"
     return ""
@@ -144,11 +148,12 @@ def _read(sensor: Element, camera: Element, link: str, report: Report) -> Camera
         add_fault(report, sensor, f" has noise of {noise:g}; a deviation is not negative")
     sees, format_ = _SEES[kind_of(sensor)], text_of(camera, "image/format") or ""
     coarse = text_of(camera, "depth_camera/format") or (format_ if not sees & _COLOUR else "")
+    size = int(width), int(height)
     return CameraSpec(
         **common,
         horizontal_fov=fov,
-        width=int(width),
-        height=int(height),
+        width=size[0],
+        height=size[1],
         near=near,
         far=far,
         noise_stddev=noise,
@@ -161,6 +166,8 @@ def _read(sensor: Element, camera: Element, link: str, report: Report) -> Camera
         depth_encoding="16UC1" if coarse.upper() in ("16UC1", "L16", "L_INT16", "R_UINT16") else "32FC1",
         depth_noise=_depth_noise(sensor, camera, report),
         distortion=tuple(_number_at(camera, f"distortion/{name}", 0.0) for name in DISTORTION),  # type: ignore[arg-type]
+        exposure=_exposure(sensor, camera, report),
+        wide=read_wide_lens(sensor, camera, size, fov, report) if kind_of(sensor) == _WIDE else None,
     )
 
 
@@ -196,6 +203,29 @@ def _depth_noise(sensor: Element, camera: Element, report: Report) -> DepthNoise
         add_fault(report, sensor, " has depth noise whose baseline and subpixel are not both positive")
         return None
     return DepthNoise(model=model, **values)  # type: ignore[arg-type]
+
+
+def _exposure(sensor: Element, camera: Element, report: Report) -> Exposure | None:
+    """Return what `<exposure>` says, an element of ours."""
+    found = camera.find("exposure")
+    kind = "none" if found is None else text_of(found, "type") or found.get("type") or "fixed"
+    if found is None or kind == "none":
+        return None
+    if kind not in ("fixed", "auto"):
+        add_fault(report, sensor, f" has an exposure of type '{kind}'; valid are none, fixed and auto")
+        return None
+    usual = Exposure(target=0.45 if kind == "auto" else None)
+    names = [field.name for field in fields(Exposure) if getattr(usual, field.name) is not None]
+    values = {name: _number_at(found, name, getattr(usual, name)) for name in names}
+    positive = min(values[name] for name in ("gain", "min_gain", "full_well")) > 0.0
+    if not (positive and values["min_gain"] <= values["max_gain"] and 0.0 < values.get("target", 0.5) < 1.0):
+        valid = "gain and full_well > 0, 0 < min_gain <= max_gain, 0 < target < 1"
+        add_fault(report, sensor, f" has an exposure that cannot be; valid are {valid}")
+        return None
+    if min(values["lag"], values["read_noise"]) < 0.0:
+        add_fault(report, sensor, " has an exposure whose lag or read_noise is negative")
+        return None
+    return Exposure(**values)
 
 
 def _topics(sensor: Element, name: str) -> CameraTopics:

@@ -28,15 +28,16 @@ class GyroBias:
         self._seconds = 0.0
         self._prior = max(stddev, 1e-6) ** 2
         self._variance, self._noise = self._prior, 0.0
-        self._since = 0.0
+        self.age_s = 0.0
+        """Time that has passed since it was learnt, as `drift` was told."""
 
     def drift(self, dt: float) -> float:
         """Return by how much the variance of a heading grows in `dt` [s], which integrates the rates [rad²].
 
         What is left of the bias keeps its sign, so the error grows with time, and its variance with time².
         """
-        self._since += dt
-        return self._variance * (2.0 * self._since - dt) * dt
+        self.age_s += dt
+        return self._variance * (2.0 * self.age_s - dt) * dt
 
     def wheels(self, linear: float, angular: float, time_s: float) -> None:
         """Take the velocity that the wheels tell [m/s, rad/s]."""
@@ -63,4 +64,4 @@ class GyroBias:
         """Take in that one more reading, so far off the mean, went into it; its error is a new one."""
         self._noise += gain * (of_one - self._noise)
         self._variance = 1.0 / (1.0 / self._prior + 1.0 / max(gain * self._noise, 1e-14))
-        self._since = 0.0
+        self.age_s = 0.0

@@ -108,9 +108,11 @@ class AprilTagNode:
             return
         self._image = None
         grey = _grey(image)
-        if grey is None or not info.k[0] > 0.0:
+        is_wide = info.distortion_model == "equidistant"
+        if grey is None or is_wide or not info.k[0] > 0.0:
             if not self._is_told:
-                what = f"images of encoding '{image.encoding}'" if grey is None else "a camera_info without K"
+                lens = "images of a wide-angle lens" if is_wide else "a camera_info without K"
+                what = f"images of encoding '{image.encoding}'" if grey is None else lens
                 self.node.get_logger().warn(f"cannot find tags in {what}, of {image.width} x {image.height}")
             self._is_told = True
             return

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from twin.bridge.msgs import CameraInfo, CompressedImage, Header, Image, PointCloud2, PointField, new
 from twin.models.lens import Lens
+from twin.models.wide_lens import WideLens
 
 _QUALITY = 80
 """Of JPEG pictures, as image_transport's default."""
@@ -99,18 +100,19 @@ def rgb(pixels: NDArray[np.uint8], encoding: str) -> NDArray[np.uint8]:
     return pixels[..., ::-1] if encoding == "bgr8" else pixels
 
 
-def camera_info(header: Header, lens: Lens) -> CameraInfo:
+def camera_info(header: Header, lens: Lens | WideLens) -> CameraInfo:
     """Return how a camera projects (REP-104)."""
     info = new(CameraInfo)
     info.header, info.height, info.width = header, lens.height, lens.width
-    info.distortion_model, info.d = "plumb_bob", np.array(lens.distortion)
+    info.distortion_model, distortion = lens.model
+    info.d = np.array(distortion)
     info.k, info.r = lens.matrix.ravel(), np.eye(3).ravel()
     info.p = np.hstack((lens.matrix, np.zeros((3, 1)))).ravel()
     return info
 
 
 def cloud(
-    header: Header, lens: Lens, z: NDArray[np.float32], rgb: NDArray[np.uint8] | None = None
+    header: Header, lens: Lens | WideLens, z: NDArray[np.float32], rgb: NDArray[np.uint8] | None = None
 ) -> PointCloud2:
     """Return a point for each pixel, row by row, nan where there is no depth; in the optical frame.
 
@@ -144,7 +146,7 @@ def cloud(
 
 
 @lru_cache(maxsize=16)
-def rays(lens: Lens) -> NDArray[np.float32]:
+def rays(lens: Lens | WideLens) -> NDArray[np.float32]:
     """Return the x and y on the plane z = 1 of what each pixel sees, shape (height, width, 2)."""
     return lens.rays().astype(np.float32)
 

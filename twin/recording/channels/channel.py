@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import rerun as rr
 
@@ -43,6 +43,8 @@ class Context:
     """By topic: what makes the pictures there."""
     images_period: Period | None
     """At its multiples [ns] pictures are kept; None: at no time."""
+    images: Literal["jpeg", "h264"] = "jpeg"
+    """As what."""
     pictures: set[str] = field(default_factory=set)
     """Topics of what cameras see in colours."""
     seen_from: dict[str, str] = field(default_factory=dict)

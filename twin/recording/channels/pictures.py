@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.periods import next_due
 from twin.recording.channels.channel import Channel, Context
+from twin.recording.channels.video import Video, columns
 from twin.recording.columns import Chunk, Component, sim_time
 from twin.recording.mounted import Mounted
 
@@ -33,7 +34,10 @@ def image_frame(topic: str) -> str:
 
 
 class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
-    """sensor_msgs/CompressedImage: JPEG and PNG, at the recording's own rate; no packed depths."""
+    """sensor_msgs/CompressedImage: JPEG and PNG, at the recording's own rate; no packed depths.
+
+    They are kept as they are, or become a video.
+    """
 
     def __init__(self, context: Context, namespace: str, topic: str) -> None:
         """Hang the picture before its camera, if the robot has one of that topic."""
@@ -41,6 +45,9 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
         self.entity = picture_entity(topic)
         self._next_ns = 0
         context.pictures.add(topic)
+        self._video = Video() if context.images == "h264" else None
+        if self._video is not None:
+            self.recording.log(self.entity, rr.VideoStream(self._video.codec), static=True)
         camera = context.cameras.get(topic)
         if camera is not None:
             self._mount(camera)
@@ -59,6 +66,11 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
     def chunks(self, rows: list[tuple[int, str, NDArray[np.uint8]]]) -> Iterator[Chunk]:
         """Yield the pictures."""
         times, kinds, files = zip(*rows, strict=True)
+        if self._video is not None:
+            frames = list(self._video.frames(times, files))
+            if frames:
+                yield self.entity, sim_time([frame.time_ns for frame in frames]), columns(frames)
+            return
         yield self.entity, sim_time(times), (_BLOB.column(list(files)), _MEDIA_TYPE.column(list(kinds)))
 
     def _mount(self, camera: Mounted) -> None:

@@ -34,12 +34,10 @@ _IDLE = frozenset(
 _HARMLESS = {
     "publish_acceleration": False,
     "dynamic_process_noise_covariance": False,
-    "smooth_lagged_data": False,
     "use_control": False,
     "reset_on_time_jump": False,
     "disabled_at_startup": False,
     "pose_use_child_frame": False,
-    "history_length": 0.0,
     "gravitational_acceleration": 9.80665,
     "initial_state": [0.0] * SIZE,
 }

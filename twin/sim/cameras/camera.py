@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from twin.models.specs import CameraSpec
 from twin.sim.cameras.depth_noise import noisy
+from twin.sim.cameras.exposure import LUMA, ExposureControl
 from twin.sim.cameras.labels import Labels
 from twin.sim.cameras.remap import Source
 from twin.sim.sensors import Mount
 
 _ENCODED = {"rgb8": slice(None), "bgr8": slice(None, None, -1)}
-_LUMA = np.array([0.299, 0.587, 0.114])
-"""ITU-R BT.601, as OpenCV weighs colours."""
 
 
 class View(NamedTuple):
@@ -41,6 +40,8 @@ class Camera:
         self.spec, self.mount = spec, mount
         self._noise = mount.noise(spec.name)
         self._depth_noise = mount.noise(spec.name, "depth")
+        self._exposure = None if spec.exposure is None else ExposureControl(spec.exposure)
+        self._shot_noise = mount.noise(spec.name, "exposure")
 
     @cached_property
     def source(self) -> Source:
@@ -66,7 +67,12 @@ class Camera:
         rgb, z = self.mount.world.eyes.look(self, colours=colours, depth=depth)
         seen = distance = None
         if colours:
-            seen = self._encoded(self.source.smooth(rgb))
+            taken = self.source.smooth(rgb)
+            if self._exposure is not None:
+                self._exposure.meter(taken, time_ns, self.source.lit)
+                grain = self._shot_noise.normal(tick, taken.size).reshape(taken.shape)
+                taken = self._exposure.exposed(taken, grain)
+            seen = self._encoded(taken)
             if spec.noise_stddev or spec.noise_mean:
                 grain = self._noise.normal(tick, seen.size).reshape(seen.shape)
                 grey = seen + 255.0 * (spec.noise_mean + spec.noise_stddev * grain)
@@ -97,5 +103,5 @@ class Camera:
 
     def _encoded(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         if self.spec.encoding == "mono8":
-            return np.rint(rgb @ _LUMA).astype(np.uint8)
+            return np.rint(rgb @ LUMA).astype(np.uint8)
         return np.ascontiguousarray(rgb[..., _ENCODED[self.spec.encoding]])

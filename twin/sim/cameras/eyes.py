@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self, TypeVar
 
 import mujoco
 import numpy as np
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from twin.sim.world import World
 
 _LOG = logging.getLogger("twin.camera")
+T = TypeVar("T", np.uint8, np.float32, np.intp)
 SHADOW_SIZE = 2048
 """Pixels along the edge of what is drawn from where the light is: in a hall of 20 m, of 1.4 cm each."""
 _NO_COLOURS, _NO_DEPTH = np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32)
@@ -65,7 +66,10 @@ class Eyes:
         spec.visual.quality.offsamples = 0
         spec.visual.quality.shadowsize = SHADOW_SIZE if world.scene.shadows else 0
         for number, camera in enumerate(cameras):
-            add_camera(spec.body(camera.mount.body), f"camera {number}", camera.spec, camera.source.size)
+            source, body = camera.source, spec.body(camera.mount.body)
+            for side, turn in enumerate(source.turns):
+                pose, name = camera.spec.T_link_sensor @ turn, f"camera {number}.{side}"
+                add_camera(body, name, pose, source.size, source.focal_length)
         self._world, self.model = world, spec.compile()
         self._data = mujoco.MjData(self.model)
         self._canvas = Canvas(self.model, *map(int, sizes.max(axis=0)))
@@ -75,20 +79,24 @@ class Eyes:
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
         self._options = mujoco.MjvOption()
         self._options.sitegroup[:] = 0
-        self._views = {id(camera): self._view(number) for number, camera in enumerate(cameras)}
+        self._views = {
+            id(camera): [self._view(f"camera {number}.{side}") for side in range(len(camera.source.turns))]
+            for number, camera in enumerate(cameras)
+        }
         self._step = -1
         self.drawn = 0
         """How many pictures."""
         self._hash = xxh3_128()
         self.renderer = self._canvas.renderer
         """Who draws, as OpenGL calls it."""
-        each = ", ".join(_words(camera.spec) for camera in cameras)
-        _tell(f"{each}: drawn by {self.renderer}; docs/cameras.md tells what that costs a run")
+        self._words = ", ".join(_words(camera.spec) for camera in cameras)
 
     def look(
         self, camera: Camera, *, colours: bool, depth: bool
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Return what a camera of the world sees now, at the size of its source; what is not asked is empty.
+
+        Of a source with several views they are below each other.
 
         Returns:
             Red, green and blue, shape (height, width, 3); z along the optical axis [m], shape (height,
@@ -101,11 +109,11 @@ class Eyes:
         self.drawn += colours + depth
         size, seen, distances = camera.source.size, _NO_COLOURS, _NO_DEPTH
         if colours:
-            self._update(camera, paint=True)
-            seen = self._canvas.draw(self._scene, *size)
+            views = self._views_of(camera, paint=True)
+            seen = _below([self._canvas.draw(scene, *size) for scene in views])
         if depth:
-            self._update(camera, paint=False)
-            distances = _metres(self._canvas.nearness(self._scene, *size), near, far)
+            views = self._views_of(camera, paint=False)
+            distances = _below([_metres(self._canvas.nearness(scene, *size), near, far) for scene in views])
         self._add(camera, seen, distances)
         return seen, distances
 
@@ -123,9 +131,9 @@ class Eyes:
         self.drawn += 1
         groups, before = self._options.geomgroup, self._options.geomgroup.copy()
         groups[GROUP_VISUAL], groups[GROUP_COLLISION] = 0, 1
-        self._update(camera, paint=False)
+        (scene,) = self._views_of(camera, paint=False)
         groups[:] = before
-        drawn = self._canvas.nearness(self._scene, *camera.source.size)
+        drawn = self._canvas.nearness(scene, *camera.source.size)
         # OpenGL's depth is linear in 1 / z: 1 at `near`, and 0 at `far`.
         np.multiply(drawn, 1.0 / near - 1.0 / far, out=nearness)
         np.add(nearness, 1.0 / far, out=nearness, where=drawn > 0.0)
@@ -138,15 +146,15 @@ class Eyes:
         """
         self._turn_to(camera)
         self.drawn += 1
-        self._update(camera, paint=True)
-        numbers = self._canvas.numbers(self._scene, *camera.source.size)
-        shown = np.full(self._scene.ngeom + 1, -1, np.intp)
-        for geom in self._scene.geoms[: self._scene.ngeom]:
-            if geom.segid >= 0 and geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:
-                shown[geom.segid + 1] = geom.objid
-        found: NDArray[np.intp] = shown[numbers]
+        size, views = camera.source.size, self._views_of(camera, paint=True)
+        found = _below([_shown(scene)[self._canvas.numbers(scene, *size)] for scene in views])
         self._add(camera, found)
         return found
+
+    def introduce(self) -> Self:
+        """Tell, once in a process, what is drawn and who does it."""
+        _tell(f"{self._words}: drawn by {self.renderer}; docs/cameras.md tells what that costs a run")
+        return self
 
     @property
     def pictures(self) -> Pictures:
@@ -172,11 +180,17 @@ class Eyes:
         clip.znear, clip.zfar = near / extent, far / extent
         return near, far
 
-    def _update(self, camera: Camera, *, paint: bool) -> None:
-        """Have what is to be drawn; what is paint only has no depth, as it is nothing to rays."""
+    def _views_of(self, camera: Camera, *, paint: bool) -> Iterator[mujoco.MjvScene]:
+        """Yield what is to be drawn, view by view; paint has no depth, as it is nothing to rays."""
         self._options.geomgroup[GROUP_PAINT] = paint
-        view, everything = self._views[id(camera)], mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(self.model, self._data, self._options, None, view, everything, self._scene)
+        model, options, everything = self.model, self._options, mujoco.mjtCatBit.mjCAT_ALL
+        scene, views = self._scene, self._views[id(camera)]
+        for view in views:
+            mujoco.mjv_updateScene(model, self._data, options, None, view, everything, scene)
+            for light in scene.lights[: scene.nlight]:
+                if light.headlight:  # which shines where the camera looks, in all its views
+                    light.dir = -self._data.cam_xmat[views[0].fixedcamid].reshape(3, 3)[:, 2]
+            yield scene
 
     def _take_state(self) -> None:
         """Have everything where it is in the world."""
@@ -190,10 +204,10 @@ class Eyes:
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
 
-    def _view(self, number: int) -> mujoco.MjvCamera:
+    def _view(self, name: str) -> mujoco.MjvCamera:
         view = mujoco.MjvCamera()
         view.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        view.fixedcamid = self.model.camera(f"camera {number}").id
+        view.fixedcamid = self.model.camera(name).id
         return view
 
 
@@ -205,6 +219,19 @@ def _words(spec: CameraSpec) -> str:
 def _tell(line: str) -> None:
     """Tell once in a process, not to /rosout: who looks changes no run."""
     _LOG.info(line)
+
+
+def _below(views: list[NDArray[T]]) -> NDArray[T]:
+    return views[0] if len(views) == 1 else np.concatenate(views)
+
+
+def _shown(scene: mujoco.MjvScene) -> NDArray[np.intp]:
+    """Return the geom that each number of a picture stands for; -1 of 0, which is none."""
+    shown = np.full(scene.ngeom + 1, -1, np.intp)
+    for geom in scene.geoms[: scene.ngeom]:
+        if geom.segid >= 0 and geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:
+            shown[geom.segid + 1] = geom.objid
+    return shown
 
 
 def _metres(nearness: NDArray[np.float32], near: float, far: float) -> NDArray[np.float32]:

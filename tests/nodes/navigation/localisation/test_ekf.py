@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,13 +22,14 @@ from twin.bridge.msgs import (
     TwistWithCovarianceStamped,
     Vector3,
     header,
+    new,
 )
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.srvs import SetEkfPose
 from twin.bridge.tf import StaticTransformBroadcaster, transform_stamped
 from twin.controllers.diff_drive import DiffDriveConfig
 from twin.geometry import Pose2, Pose3
-from twin.navigation.localisation.ekf import SIZE, VX, VY, VYAW, X, Y
+from twin.navigation.localisation.ekf import SIZE, VX, VY, VYAW, YAW, X, Y
 from twin.nodes.diff_drive_controller import DiffDriveControllerNode, DiffDriveNodeConfig
 from twin.nodes.navigation.localisation.ekf import EkfNode
 from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
@@ -175,6 +178,68 @@ def test_a_second_source_and_the_service_set_pose(bench: Bench) -> None:
     client.call_async(SetEkfPose.Request(pose=PoseWithCovarianceStamped(header=header(0, "odom"), pose=pose)))
     bench.run(0.2)
     assert filtered[-1].pose.pose.position.x == pytest.approx(7.0, abs=0.01)
+
+
+SPEED = EkfSource(topic="speed", config=which(VX, VY, VYAW))
+SEEN = EkfSource(topic="seen", config=which(X, Y, YAW))
+
+
+def seen_late(bench: Bench, lateness: float, **parameters: Any) -> Odometry:
+    """Return what the filter says after 2 s of a bend, of which it is told the pose so late [s]."""
+    config = EkfNodeConfig(sources={"twist0": SPEED, "pose0": SEEN}, **parameters)
+    EkfNode(bench.bus, config, namespace=f"late_{bench.clock.now_ns}")
+    space = f"/late_{bench.clock.now_ns}"
+    speed = bench.node.create_publisher(TwistWithCovarianceStamped, f"{space}/speed", 10)
+    seen = bench.node.create_publisher(PoseWithCovarianceStamped, f"{space}/seen", 10)
+    filtered = bench.listen(Odometry, f"{space}/odometry/filtered", 10)
+    start = bench.clock.now_ns
+    for tick in range(1, 101):
+        stamp_ns = start + tick * 20_000_000 - 10_000_000
+        twist = TwistWithCovariance(twist=twist_from_planar(0.9, 0.7), covariance=0.01 * np.eye(6).ravel())
+        speed.publish(TwistWithCovarianceStamped(header=header(stamp_ns, "base_footprint"), twist=twist))
+        behind = round(lateness / 0.02)
+        if tick % 5 == 0 and tick > behind:
+            then_ns = stamp_ns - behind * 20_000_000 - 3_000_000
+            turned = 0.8 * (then_ns - start) * 1e-9  # of a circle with a radius of 1.25 m, at 1 m/s
+            pose = Pose2(1.25 * math.sin(turned), 1.25 * (1.0 - math.cos(turned)), turned)
+            known = PoseWithCovariance(pose=pose_from_pose2(pose), covariance=1e-6 * np.eye(6).ravel())
+            seen.publish(PoseWithCovarianceStamped(header=header(then_ns, "odom"), pose=known))
+        bench.run(0.02)
+    return filtered[-1]
+
+
+def test_what_comes_late_counts_at_its_time_if_the_filter_remembers(bench: Bench) -> None:
+    """0.2 s is 0.2 m, and 0.16 rad."""
+    smooth = {"smooth_lagged_data": True, "history_length_ns": 1_000_000_000}
+    told = [seen_late(bench, 0.2), seen_late(bench, 0.2, **smooth), seen_late(bench, 0.0, **smooth)]
+    told.append(seen_late(bench, 0.2, smooth_lagged_data=True, history_length_ns=50_000_000))
+    true = Pose2(1.25 * math.sin(1.6), 1.25 * (1.0 - math.cos(1.6)), 1.6)
+    off = [
+        math.hypot(each.pose.pose.position.x - true.x, each.pose.pose.position.y - true.y) for each in told
+    ]
+    turned = [abs(yaw_from_quaternion(each.pose.pose.orientation) - true.yaw) for each in told]
+    assert off[0] > 0.1
+    assert turned[0] > 0.1
+    assert max(off[1:3]) < 0.06, "what the wheels are wrong by until the next pose"
+    assert max(turned[1:3]) < 0.06
+    assert off[3] > 0.1, "what is older than what is remembered counts as before"
+
+
+def test_the_first_odometry_is_that_of_the_wheels(bench: Bench) -> None:
+    """Another one is never quite at rest."""
+    ekf = EkfNode(
+        bench.bus, EkfNodeConfig(sources=EkfNodeConfig().sources | {"odom1": replace(SEEN, topic="seen")})
+    )
+    publishers = [bench.node.create_publisher(Odometry, topic, 10) for topic in ("odom", "seen")]
+    imu = bench.node.create_publisher(Imu, "imu", SENSOR_DATA)
+    for _ in range(100):
+        now = header(bench.clock.now_ns, "base_footprint")
+        for publisher, speed in zip(publishers, (0.0, 0.01), strict=True):
+            twist = TwistWithCovariance(twist=twist_from_planar(speed, 0.0), covariance=np.eye(6).ravel())
+            publisher.publish(Odometry(header=now, child_frame_id="base_footprint", twist=twist))
+        imu.publish(new(Imu, header=now, angular_velocity=Vector3(0.0, 0.0, 0.004)))
+        bench.run(0.02)
+    assert ekf.biases[-2].value[2] == pytest.approx(0.004, abs=1e-4)
 
 
 def test_a_source_that_is_none_is_refused() -> None:

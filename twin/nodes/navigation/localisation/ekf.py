@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,19 +31,34 @@ from twin.bridge.msgs import (
 from twin.bridge.qos import SENSOR_DATA, QoS
 from twin.bridge.srvs import SetEkfPose
 from twin.bridge.tf import TransformBroadcaster, TransformBuffer, TransformListener, transform_stamped
-from twin.geometry import Pose2, Pose3, quat_wxyz_from_rpy, rpy_from_quat_wxyz
+from twin.geometry import Array, Pose2, Pose3, quat_wxyz_from_rpy, rpy_from_quat_wxyz
 from twin.navigation.localisation import ekf as states
 from twin.navigation.localisation.ekf import Ekf
 from twin.navigation.localisation.gyro_bias import GyroBias
 from twin.nodes.navigation.localisation.ekf_config import EkfNodeConfig, EkfSource
-from twin.nodes.navigation.localisation.ekf_sources import KINDS, SourceReader
+from twin.nodes.navigation.localisation.ekf_sources import KINDS, Measurement, SourceReader
 from twin.nodes.node_parameters import declare_config
+
+_Taken = tuple[int, Callable[[], list[Measurement]]]
+"""When something was measured [ns], and what."""
+
+
+class _Moment(NamedTuple):
+    """The filter when something was measured."""
+
+    time_ns: int
+    state: Array
+    covariance: Array
+    bias_ages_s: tuple[float, ...]
+    """Of the readers."""
 
 
 class EkfNode:
     """Takes `odom`, `imu` and `set_pose`; publishes `odometry/filtered` and odom → base.
 
-    Measurements are taken in at their stamps, oldest first, then the state is predicted to the present.
+    Measurements are taken in at their stamps, oldest first, then the state is predicted to the present. What
+    is older than the state counts as if it were not, or, with `smooth_lagged_data`, the state of its time is
+    gone on from, with all that came since.
     """
 
     def __init__(self, bus: Bus, config: EkfNodeConfig | None = None, *, namespace: str = "") -> None:
@@ -49,6 +67,8 @@ class EkfNode:
         self.filter = Ekf(config.ekf)
         self._time_ns: int | None = None
         self._waiting: list[tuple[int, int, SourceReader, Any]] = []
+        self._past: deque[_Moment] = deque()
+        self._taken: deque[tuple[int, list[Measurement]]] = deque()
         declare_config(node, config)
         self._buffer = TransformBuffer()
         self._listener = TransformListener(self._buffer, node)
@@ -57,6 +77,8 @@ class EkfNode:
         node.create_subscription(PoseWithCovarianceStamped, "set_pose", self._on_set_pose, 1)
         node.create_service(SetEkfPose, "set_pose", self._on_set_pose_request)
         self._readers: list[SourceReader] = []
+        odometries = (name for name in config.sources if name.startswith("odom"))
+        self._wheels = min(odometries, key=lambda name: int(name[4:]), default="")
         for name, source in config.sources.items():
             self._listen(name, source)
         node.create_timer(config.period_ns, self._update)
@@ -74,7 +96,12 @@ class EkfNode:
         rotation = np.eye(states.SIZE)
         rotation[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
         self.filter.covariance = rotation @ covariance @ rotation.T
-        self._waiting.clear()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Forget what was measured: the pose was set."""
+        for kept in (self._waiting, self._past, self._taken):
+            kept.clear()
         for reader in self._readers:
             reader.reset()
 
@@ -91,7 +118,7 @@ class EkfNode:
 
         def on_message(message: Any) -> None:
             self._waiting.append((ns(message.header.stamp), len(self._waiting), reader, message))
-            if isinstance(message, Odometry):
+            if name == self._wheels:
                 self._tell_wheels(message)
 
         qos = replace(SENSOR_DATA if kind is Imu else QoS(), depth=source.queue_size)
@@ -114,9 +141,7 @@ class EkfNode:
             log.error(f"set_pose refused: its frame is '{frame}', not '{self.config.world_frame}'")
             return
         self.filter.set_pose(vector, covariance)
-        self._waiting.clear()
-        for reader in self._readers:
-            reader.reset()
+        self._forget()
 
     def _on_set_pose_request(self, request: Any) -> object:
         self._on_set_pose(request.pose)
@@ -124,17 +149,60 @@ class EkfNode:
 
     def _update(self) -> None:
         now = self.node.now_ns
-        if self._time_ns is not None:
-            self._time_ns = min(self._time_ns, now)  # the clock may have been set back
+        if self._time_ns is not None and now < self._time_ns:  # the clock was set back
+            self._time_ns = now
+            self._past.clear()
+            self._taken.clear()
         self._waiting.sort(key=lambda entry: entry[:2])
+        due = self._back_to(self._waiting[0][0]) if self._waiting else []
         for stamp_ns, _, reader, message in self._waiting:
+            due.append((stamp_ns, partial(self._read, stamp_ns, reader, message)))
+        for stamp_ns, measure in sorted(due, key=lambda entry: entry[0]):
             self._predict(min(stamp_ns, now))
-            for found in reader.read(message, stamp_ns, self.filter.state[states.ANGLES]):
-                self.filter.correct(found.states, found.values, found.covariance, threshold=found.threshold)
+            found = measure()
+            for one in found:
+                self.filter.correct(one.states, one.values, one.covariance, threshold=one.threshold)
+            self._remember(found, now)
         self._waiting.clear()
         if self._time_ns is not None:
             self._predict(now)
             self._publish(now)
+
+    def _read(self, stamp_ns: int, reader: SourceReader, message: Any) -> list[Measurement]:
+        return list(reader.read(message, stamp_ns, self.filter.state[states.ANGLES]))
+
+    def _back_to(self, stamp_ns: int) -> list[_Taken]:
+        """Be as before a time that has passed; return what was measured since, which is to be taken again.
+
+        What is older than what is remembered moves nothing.
+        """
+        if self._time_ns is None or stamp_ns >= self._time_ns or not self._past:
+            return []
+        if stamp_ns < self._past[0].time_ns:
+            return []
+        while self._past[-1].time_ns > stamp_ns:
+            self._past.pop()
+        moment = self._past[-1]
+        self._time_ns, self.filter.state, self.filter.covariance = moment[:3]
+        for reader, age_s in zip(self._readers, moment.bias_ages_s, strict=True):
+            reader.bias.age_s = age_s
+        again: list[_Taken] = []
+        while self._taken and self._taken[-1][0] > moment.time_ns:
+            time_ns, found = self._taken.pop()
+            again.insert(0, (time_ns, partial(list, found)))
+        return again
+
+    def _remember(self, found: list[Measurement], now: int) -> None:
+        """Keep the state and what made it, as long as somebody may ask for it."""
+        if not self.config.smooth_lagged_data or self._time_ns is None:
+            return
+        ages = tuple(reader.bias.age_s for reader in self._readers)
+        state, covariance = self.filter.state.copy(), self.filter.covariance.copy()
+        self._past.append(_Moment(self._time_ns, state, covariance, ages))
+        self._taken.append((self._time_ns, found))
+        while len(self._past) > 1 and self._past[1].time_ns <= now - self.config.history_length_ns:
+            self._past.popleft()
+            self._taken.popleft()
 
     def _predict(self, time_ns: int) -> None:
         if self._time_ns is not None and time_ns > self._time_ns:

@@ -56,7 +56,7 @@ class EkfSource:
     remove_gravitational_acceleration: bool = True
     """Whether gravity is in its accelerations, and to be taken off."""
     estimate_bias: bool = True
-    """Whether a gyroscope's bias is learnt while the wheels stand (robot_localization does not)."""
+    """Whether its bias is learnt while the wheels, the first `odomN`, stand (robot_localization does not)."""
     bias_stddev: Annotated[RadiansPerSecond, NotNegative] = 1e-3
     """Standard deviation of that bias before it was learnt; its datasheet tells."""
 
@@ -98,6 +98,10 @@ class EkfNodeConfig:
     """Whether it publishes odom → base; if not, the drive's controller does."""
     transform_time_offset_ns: Annotated[DurationNs, Interval(ge=-60.0, le=60.0)] = 0
     """That transform is stamped this far ahead."""
+    smooth_lagged_data: bool = False
+    """Whether what comes late counts at its time, and what was measured since once more."""
+    history_length_ns: Annotated[DurationNs, Interval(ge=0.0, le=60.0)] = 0
+    """How late that may be."""
     map_frame: Annotated[str, Derived] = "map"
     """Fixed in the world; of the filter it publishes nothing in it."""
     odom_frame: Annotated[str, Derived] = "odom"
