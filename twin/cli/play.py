@@ -40,14 +40,15 @@ def play(
     from twin.recording import player
 
     file = find_recording(recording)
-    if not web and (lacking := player.unshown(file)):
-        stderr().print(lacking, markup=False)
     if screenshot is not None:
         check_file(screenshot, "--screenshot")
         player.screenshot(file, screenshot, time_s=at, view=view)
-        return
-    if at is not None or view is not None:
+    elif at is not None or view is not None:
         raise typer.BadParameter("--at and --view are of a picture: add --screenshot PNG")
+    if not web and (lacking := player.unshown(file)):
+        stderr().print(lacking, markup=False)
+    if screenshot is not None:
+        return
     raise typer.Exit(
         player.play(file, web=web, port=port, on_ready=lambda url: stderr().print(f"open {url}"))
     )

@@ -90,6 +90,8 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
             picture = client.take_screenshot(view_id)
         except ConnectionError as fault:
             raise RecordingError(f"the view {view!r} is behind another tab, and not drawn") from fault
+        except TimeoutError as fault:
+            raise RecordingError("the viewer drew nothing in time; is the computer busy?") from fault
     write_whole(png, picture)
 
 
