@@ -246,6 +246,22 @@ class Bus:
                 self.enter(arrival)
         return len(arrivals)
 
+    def serve(self, only: Node | None = None) -> None:
+        """Let nodes hear at once what came from outside, while time stands: they do nothing else.
+
+        Args:
+            only: The one that does; what others are told waits for their next spin.
+        """
+        if guard.pending:
+            guard.deliver()
+        for arrival in self.external.drain():
+            if only is not None and arrival.receiver.node is not only:
+                self.enter(arrival)
+                continue
+            for tap in self.arrival_taps:
+                tap(arrival)
+            arrival.receiver.handle(arrival.data, True)
+
     def enter(self, arrival: Arrival) -> None:
         """Put what came from outside into its inbox."""
         for tap in self.arrival_taps:
