@@ -255,12 +255,10 @@ class Bus:
         if guard.pending:
             guard.deliver()
         for arrival in self.external.drain():
-            if only is not None and arrival.receiver.node is not only:
-                self.enter(arrival)
-                continue
-            for tap in self.arrival_taps:
-                tap(arrival)
-            arrival.receiver.handle(arrival.data, True)
+            self.enter(arrival)
+            node = arrival.receiver.node
+            if only is None or node is only:
+                node.hear(arrival.receiver)
 
     def enter(self, arrival: Arrival) -> None:
         """Put what came from outside into its inbox."""

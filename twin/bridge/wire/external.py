@@ -29,9 +29,6 @@ class Receiver(Protocol):
     def enqueue(self, data: Any, external: bool) -> None:
         """Put into the node's inbox."""
 
-    def handle(self, data: Any, external: bool) -> None:
-        """Call back."""
-
 
 class Arrival(NamedTuple):
     """A sample, request or reply from outside."""

@@ -39,7 +39,7 @@ class Entry:
 
 
 class TaskQueue:
-    """At most one task is under way; who is told `position` counts those that wait from 1, and 0 is the end."""
+    """At most one task is under way; a `position` counts those that wait from 1, and 0 is the end."""
 
     def __init__(self) -> None:
         self._ended: deque[Entry] = deque(maxlen=_KEPT)
