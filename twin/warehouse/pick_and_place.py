@@ -95,7 +95,7 @@ class PickAndPlaceNode(MobileManipulationNode):
                 self.detect("StopLooking", enabled=False),
                 fingers,
                 self.retract(loaded=held),
-                *([self.undock_from(self.docked_at)] if self.docked_at else []),
+                *([self.undock_from("shelf")] if self.is_docked else []),
                 self.move_to_height("LowerToCarry", carry_z, loaded=held),
             ],
         )

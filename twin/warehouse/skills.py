@@ -104,8 +104,8 @@ class MobileManipulationNode(MissionNode):
         """What the fingers have closed on, and not lost."""
         self.gripped: set[str] = set()
         """Names of all that they have closed on."""
-        self.docked_at = ""
-        """Type of the dock from which the robot has not backed off yet; empty: there is none."""
+        self.is_docked = False
+        """Whether the robot has docked, and not backed off since."""
         node = self.node
         self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")
         self._dock = ActionClient(node, DockRobot, "dock_robot")
@@ -161,7 +161,7 @@ class MobileManipulationNode(MissionNode):
         docked = slot.approach(0.0) @ Pose2(-self.skills.docked_distance, 0.0, 0.0)
 
         def done(result: Any) -> None:
-            self.docked_at = dock_type
+            self.is_docked = True
 
         return self._call(
             f"Dock[{slot.name}]",
@@ -181,7 +181,7 @@ class MobileManipulationNode(MissionNode):
         goal = new(UndockRobot.Goal, dock_type=dock_type)
 
         def done(result: Any) -> None:
-            self.docked_at = ""
+            self.is_docked = False
 
         return self._call("Undock", self._undock, lambda: goal, done)
 

@@ -117,7 +117,10 @@ function RobotQueue({ station, t }) {
   };
   const item = ({ id, state, task, step, error }) => {
     const at = pending.findIndex((each) => each.id === id) + 1, words = describe(task, t);
-    const button = (name, by) => html`<button class="icon" id="${name}-${id}" aria-label="${t(name)}: ${words}" disabled=${at + by < 1 || at + by > pending.length} onClick=${() => move(id, at + by, `${name}-${id}`)}>${by < 0 ? "↑" : "↓"}</button>`;
+    const button = (name, by) => { // one that cannot go on keeps the focus, so it is not disabled
+      const idle = at + by < 1 || at + by > pending.length;
+      return html`<button class="icon" id="${name}-${id}" aria-label="${t(name)}: ${words}" aria-disabled=${idle} onClick=${() => idle || move(id, at + by, `${name}-${id}`)}>${by < 0 ? "↑" : "↓"}</button>`;
+    };
     return html`<li key=${id} data-state=${STATES[state]} data-id=${id}>
       <div class="grow"><b>${words}</b><br /><span class="state ${STATES[state]}">${t(`task_${STATES[state]}`)} ${state === ACTIVE ? step.replace(/^task \d+: /, "") : error}</span></div>
       ${state === PENDING && html`${button("earlier", -1)}${button("later", 1)}`}
