@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from tests.web.test_page import address, eventually, page, violations
-from tests.web.test_page import pytestmark as pytestmark
+from tests.web.test_page import pytestmark as browser
 
 __all__ = ["address", "page"]
+pytestmark = [*browser, pytest.mark.timeout(900)]
 
 SCENARIO = """
 name: operator
@@ -30,9 +31,16 @@ checks:
 
 @pytest.fixture(autouse=True)
 def tasks(page: Any) -> None:
-    """Show the panel of tasks."""
+    """Show the panel of tasks, beside a map that costs little, with nothing left to do."""
+    page.set_viewport_size({"width": 920, "height": 700})
     page.click("#tab-tasks")
     page.wait_for_selector("#add-task")
+    if page.locator("#clear-tasks").count():
+        page.click("#clear-tasks")
+        page.wait_for_selector("#clear-tasks", state="detached")
+    if page.locator("#resume-tasks").count():
+        page.click("#resume-tasks")
+    page.wait_for_selector("#pause-tasks")
 
 
 def add(page: Any, kind: str, **fields: str) -> None:
@@ -61,7 +69,7 @@ def held(page: Any, *, paused: bool) -> None:
     page.wait_for_selector("#simulation-step:enabled" if paused else "#simulation-step:disabled")
 
 
-def test_tasks_are_added_done_reordered_and_cancelled_and_time_is_held(page: Any) -> None:
+def test_tasks_are_added_refused_reordered_and_cancelled(page: Any) -> None:
     # A queue that is held takes tasks, and begins none.
     page.click("#pause-tasks")
     page.wait_for_selector("#held")
@@ -87,6 +95,14 @@ def test_tasks_are_added_done_reordered_and_cancelled_and_time_is_held(page: Any
     page.locator("#queue li[data-state=waiting] button[aria-label^=Cancel]").first.click()
     eventually(lambda: len(waiting(page)) == 2, "it is cancelled")
     page.wait_for_selector("#queue li[data-state=canceled]")
+
+
+def test_what_waits_is_done_unless_somebody_holds_time_or_stops_the_robot(page: Any) -> None:
+    page.click("#pause-tasks")
+    page.wait_for_selector("#held")
+    add(page, "wait", seconds="2")
+    add(page, "drive_to", place="charger")
+    eventually(lambda: len(waiting(page)) == 2, "a queue that is held begins nothing")
 
     # Time stands while it is held, and the page is answered.
     page.click("#simulation-play")
@@ -114,7 +130,10 @@ def test_tasks_are_added_done_reordered_and_cancelled_and_time_is_held(page: Any
     page.click("#resume-tasks")
     page.wait_for_selector("#queue li[data-state=succeeded]:has-text('Drive to start')")
 
-    # A reset begins anew: nothing has been done yet, and the page goes on.
+
+def test_a_reset_begins_anew_and_the_page_goes_on(page: Any) -> None:
+    add(page, "wait", seconds="1")
+    page.wait_for_selector("#queue li[data-state=succeeded]")
     page.select_option("#simulation-speed", "5")
     page.click("#simulation-reset")
     page.click("#reset-confirm")
