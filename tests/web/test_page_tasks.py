@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
+from tests.runtime.test_lost_tote import HALL
 from tests.web.test_page import address, eventually, page, violations
 from tests.web.test_page import pytestmark as browser
 
-__all__ = ["address", "page"]
+__all__ = ["HALL", "address", "page"]
 pytestmark = [*browser, pytest.mark.timeout(900)]
 
 SCENARIO = """
@@ -17,15 +18,11 @@ name: operator
 description: A robot waits for tasks.
 seed: 1
 duration: 60 min
-world: {arena: warehouse}
+world: {arena: hall.yaml}
 robots:
-  - model: warehouse_bot
-    start: start
-    localisation: {type: amcl, map: warehouse}
-    navigation: {}
+  - {model: warehouse_bot, start: start, localisation: {type: amcl}, navigation: {}}
 mission: {type: tasks, robot: warehouse_bot}
-checks:
-  - no_collision:
+checks: [no_collision: ]
 """
 
 
@@ -75,14 +72,14 @@ def test_tasks_are_added_refused_reordered_and_cancelled(page: Any) -> None:
     page.wait_for_selector("#held")
     add(page, "wait", seconds="2")
     eventually(lambda: waiting(page) == ["Wait 2 s"], "what is typed is what is added")
-    add(page, "drive_to", place="", x="-7.5", y="-5.4", heading="0")
+    add(page, "drive_to", place="", x="-1", y="-1", heading="0")
     eventually(lambda: len(waiting(page)) == 2, "a typed pose")
-    add(page, "carry", tote="tote_b", to="unloading/0/1")
-    eventually(lambda: waiting(page)[2:] == ["Carry tote_b → unloading/0/1"], "a tote")
+    add(page, "carry", tote="tote", to="unloading/0/0")
+    eventually(lambda: waiting(page)[2:] == ["Carry tote → unloading/0/0"], "a tote")
 
     # What cannot be done is refused, in a sentence that says what can.
-    add(page, "drive_to", place="", x="1", y="0.4", heading="90")
-    said(page, "(1.00, 0.40) is in a wall, or cannot be reached; the nearest place that can is (")
+    add(page, "drive_to", place="", x="0", y="1.7", heading="90")
+    said(page, "(0.00, 1.70) is in a wall, or cannot be reached; the nearest place that can is (")
     assert len(waiting(page)) == 3
 
     # By keyboard alone the tote is put first, and stays in hand: then it is taken out.
@@ -101,7 +98,7 @@ def test_what_waits_is_done_unless_somebody_holds_time_or_stops_the_robot(page: 
     page.click("#pause-tasks")
     page.wait_for_selector("#held")
     add(page, "wait", seconds="2")
-    add(page, "drive_to", place="charger")
+    add(page, "carry", tote="tote", to="unloading")
     eventually(lambda: len(waiting(page)) == 2, "a queue that is held begins nothing")
 
     # Time stands while it is held, and the page is answered.
@@ -116,7 +113,7 @@ def test_what_waits_is_done_unless_somebody_holds_time_or_stops_the_robot(page: 
     # What waits is done when the queue goes on.
     page.click("#resume-tasks")
     page.wait_for_selector("#queue li[data-state=succeeded]:has-text('Wait')")
-    page.wait_for_selector("#queue li[data-state=active]:has-text('Drive to')")
+    page.wait_for_selector("#queue li[data-state=active]:has-text('Carry')")
 
     # The emergency stop ends what is under way, and holds the queue past its release.
     page.click("#stop")
