@@ -7,6 +7,7 @@ TwinError
 ├── MapError          a map file is wrong
 ├── CloudError        a file of points is wrong, or points lack what is to be done with them
 ├── NavigationError   a behaviour tree or a file of Nav2 parameters is wrong
+├── TaskError         a robot cannot do a task, or a queue holds none that is meant
 ├── BridgeError       the bus: a port in use, an unknown message type, an invalid name
 ├── PluginError       a user's plugin lacks something, cannot be found, or fails while it runs
 ├── RecordingError    a recording cannot be written or read
@@ -104,6 +105,10 @@ class CloudError(TwinError):
 
 class NavigationError(TwinError):
     """A behaviour tree or a file of Nav2 parameters is wrong."""
+
+
+class TaskError(TwinError):
+    """A robot cannot do a task, or its queue holds none that is meant."""
 
 
 class BridgeError(TwinError):

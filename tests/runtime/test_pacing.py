@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from twin.runtime.pacing import Pace
@@ -70,3 +72,18 @@ def test_losses_are_counted_apart_when_the_pace_was_kept_between() -> None:
     run(wall, pace, [0.001, 1.0, 0.001, 0.001, 2.0, 0.5, 0.001, 0.001])
     assert pace.losses == 2, "2 s and 0.5 s in a row are one"
     assert pace.lost_s == pytest.approx(3.5 - 3 * 0.02)
+
+
+def test_what_a_run_stands_still_is_no_loss_and_its_pace_may_change() -> None:
+    wall = Wall()
+    pace = wall.pace(1.0)
+    run(wall, pace, [0.001] * 50)
+    wall.now += 60.0  # it is held
+    pace.go_on(1.0, 2.0)
+    began = wall.now
+    ends = run(wall, pace, [0.001] * 100, start=1.0)
+    assert ends[-1] - began == pytest.approx(100 * 0.02 / 2.0)
+    pace.go_on(3.0, math.inf)
+    ends = run(wall, pace, [0.001] * 100, start=3.0)
+    assert ends[-1] - ends[0] == pytest.approx(99 * 0.001), "as fast as possible: nothing is waited for"
+    assert (pace.losses, pace.lost_s) == (0, 0.0)

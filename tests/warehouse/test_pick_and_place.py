@@ -106,20 +106,24 @@ class Robot:
         mission.carry(tasks or [task()])
         while not mission.done:
             assert self.clock.now_ns < seconds * 1e9, f"no end; it is at {mission.state!r}"
-            self.clock.now_ns += 20_000_000
-            names = list(self.positions)
-            zeros, values = np.zeros(len(names)), np.array(list(self.positions.values()))
-            effort = np.array([-self.effort * (name == self.manipulator.gripper_joint) for name in names])
-            self._joints.publish(
-                JointState(header=header(0, ""), name=names, position=values, velocity=zeros, effort=effort)
-            )
-            if self.sees_tote and self._detecting and self.clock.now_ns % 100_000_000 == 0:
-                poses = [pose_from_pose2(pose) for pose in self.totes_in_base]
-                stamp = header(self.clock.now_ns, "base_footprint")
-                self._totes.publish(PoseArray(header=stamp, poses=poses))
-            self.bus.spin()
+            self.advance()
         self.bus.spin()  # the last words arrive
         return mission
+
+    def advance(self) -> None:
+        """Let 20 ms pass, sense, and let all nodes run."""
+        self.clock.now_ns += 20_000_000
+        names = list(self.positions)
+        zeros, values = np.zeros(len(names)), np.array(list(self.positions.values()))
+        effort = np.array([-self.effort * (name == self.manipulator.gripper_joint) for name in names])
+        self._joints.publish(
+            JointState(header=header(0, ""), name=names, position=values, velocity=zeros, effort=effort)
+        )
+        if self.sees_tote and self._detecting and self.clock.now_ns % 100_000_000 == 0:
+            poses = [pose_from_pose2(pose) for pose in self.totes_in_base]
+            stamp = header(self.clock.now_ns, "base_footprint")
+            self._totes.publish(PoseArray(header=stamp, poses=poses))
+        self.bus.spin()
 
     def _serve(self, name: str, action: ActionType, perform: Callable[[Any], Any]) -> None:
         def execute(handle: GoalHandle) -> Generator[None, None, Any]:

@@ -50,9 +50,11 @@ def eventually(holds: Callable[[], bool], what: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def address(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Where a page is served, beside a run of the module's `SCENARIO`, in its `HALL` if it has one."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "operator.yaml").write_text(SCENARIO)
+    (folder / "operator.yaml").write_text(request.module.SCENARIO)
+    (folder / "hall.yaml").write_text(getattr(request.module, "HALL", ""))
     endpoint, port = free_endpoint(), free_endpoint().rpartition(":")[2]
     twin = [sys.executable, "-m", "twin.cli"]
     run = [*twin, "run", "operator.yaml", "--free", "--pace", "1", "--listen", endpoint, "--no-record"]

@@ -343,7 +343,15 @@ def test_one_steers_at_a_time(world: World) -> None:
 
 
 @pytest.mark.parametrize(
-    "service", ["/guard/release", "/fleet/add_task", "/go/_action/cancel_goal", "/turtle1/teleport_absolute"]
+    "service",
+    [
+        "/guard/release",
+        "/fleet/add_task",
+        "/clear_tasks",
+        "/go/_action/cancel_goal",
+        "/turtle1/teleport_absolute",
+        "/simulation/set_speed",
+    ],
 )
 def test_services_that_steer_need_control(world: World, service: str) -> None:
     called = []
@@ -409,6 +417,8 @@ def test_requests_that_a_client_never_answers_are_bounded(world: World) -> None:
         ("/turtlebot3/controller_server/set_parameters_atomically", False),
         ("/turtlebot3/change_map", False),
         ("/slam_toolbox/clear_queue", True),
+        ("/robot_1/move_task", True),
+        ("/reset_simulation", True),
         ("/clear_all/set_parameters", False),
     ],
 )

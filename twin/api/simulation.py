@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from twin.bridge.wire.session import SessionConfig
     from twin.recording.live_screen import LiveScreen
     from twin.runtime import OpenRun, Progress
+    from twin.runtime.simulation_control import SimulationControl
     from twin.scenario.outside import ClockMode
     from twin.scenario.schema import Scenario
     from twin.scenario.verdict import Verdict
@@ -118,6 +120,9 @@ class Simulation(Participant):
         self._name, self._seed = Path(str(scenario)).stem, 0
         self._clock: ClockMode = "inproc"
         self._run: OpenRun | None = None
+        self._control: SimulationControl | None = None
+        self._can_reset = False
+        """Whether `run` goes on with another one: who steps the run holds what is in it."""
         self._verdict: Verdict | None = None
         self._held = ExitStack()
         weakref.finalize(self, self._held.close)
@@ -223,8 +228,11 @@ class Simulation(Participant):
         """
         if self._verdict is None:
             run = self._running
+            self._can_reset = True
             with self._told():
-                run.advance_to_end(progress)
+                run.advance_to_end(progress, lambda _: self._is_to_reset)
+                while self._is_to_reset:
+                    self._reset().advance_to_end(progress, lambda _: self._is_to_reset)
         return self.finish()
 
     def wait_for_viewer(self) -> None:
@@ -288,34 +296,59 @@ class Simulation(Participant):
         if self._params_file is not None:
             scenario = scenario.with_params_file(Path(self._params_file).resolve())
         self._name, self._seed = scenario.name, scenario.seed
-        from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
-
         if callable(self._out):
             self._hold(self._out(scenario.name))
         if self._save_model is not None:
             model = make_folder(self._save_model)
             if self.folder is None or model.resolve() != self.folder.resolve():
                 self._held.enter_context(written_alone(model))
-        self._run = runtime.OpenRun(
+        self._begin(scenario)
+
+    def _begin(self, scenario: Scenario) -> OpenRun:
+        from twin import runtime  # 2 s of imports that a mistake in the file need not wait for
+
+        self._run = run = runtime.OpenRun(
             scenario,
             out=self.folder,
             record=self._record,
             pace=self._pace,
             listen=self._listen,
             network=self._network,
-            outside=outside,
+            outside=self._outside(),
             bag=self.folder / "bag" if self._bag and self.folder is not None else None,
             bag_hidden_topics=self._bag_hidden_topics,
             save_model=self._save_model,
             workers=self._workers,
             screen=self._screen,
         )
-        self._held.callback(self._run.close)
+        self._held.callback(run.close)
         if self._clock == "free" and not self._workers:
             from twin.live.futures.inputs import Inputs
             from twin.live.futures.node import FuturesNode
+            from twin.runtime.simulation_control import SimulationControl, SimulationState
 
-            FuturesNode(self._run, Inputs(self._run) if self._keep_inputs else None)
+            FuturesNode(run, Inputs(run) if self._keep_inputs else None)
+            state = SimulationState(speed=self._pace or 0.0) if self._control is None else self._control.state
+            self._control = SimulationControl(
+                run, state, can_reset=lambda: self._can_reset, keeps_inputs=self._keep_inputs
+            )
+        return run
+
+    @property
+    def _is_to_reset(self) -> bool:
+        return self._control is not None and self._control.is_to_reset
+
+    def _reset(self) -> OpenRun:
+        """End the run without a verdict, and begin it anew; what it has left so far goes."""
+        run = self._running
+        run.close()
+        if self._bag and self.folder is not None:
+            shutil.rmtree(self.folder / "bag", ignore_errors=True)
+        with uncollected():
+            again = self._begin(run.run.scenario)
+        assert self._control is not None
+        again.go_on(self._control.state.speed or math.inf)
+        return again
 
     def _hold(self, folder: Path) -> None:
         """Take the folder of the results; a verdict of an earlier run there must not pass for this one's."""

@@ -246,6 +246,20 @@ class Bus:
                 self.enter(arrival)
         return len(arrivals)
 
+    def serve(self, only: Node | None = None) -> None:
+        """Let nodes hear at once what came from outside, while time stands: they do nothing else.
+
+        Args:
+            only: The one that does; what others are told waits for their next spin.
+        """
+        if guard.pending:
+            guard.deliver()
+        for arrival in self.external.drain():
+            self.enter(arrival)
+            node = arrival.receiver.node
+            if only is None or node is only:
+                node.hear(arrival.receiver)
+
     def enter(self, arrival: Arrival) -> None:
         """Put what came from outside into its inbox."""
         for tap in self.arrival_taps:

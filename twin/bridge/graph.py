@@ -240,8 +240,7 @@ class Graph:
     @property
     def endpoints(self) -> tuple[EndpointInfo, ...]:
         """Sorted by name, node and kind."""
-        found = [item for item in self._all() if isinstance(item, EndpointInfo)]
-        return tuple(sorted(found, key=lambda e: (e.name, e.node, e.kind, e.gid)))
+        return _in_order(item for item in self._all() if isinstance(item, EndpointInfo))
 
     def publishers(self, name: str) -> tuple[EndpointInfo, ...]:
         """Return who publishes a topic."""
@@ -278,7 +277,8 @@ class Graph:
             return list(chain.from_iterable(self._known.values()))
 
     def _of(self, kind: EndpointKind, name: str) -> tuple[EndpointInfo, ...]:
-        return tuple(e for e in self.endpoints if e.kind == kind and e.name == name)
+        found = (item for item in self._all() if isinstance(item, EndpointInfo))
+        return _in_order(e for e in found if e.kind == kind and e.name == name)
 
     def _add(self, token: str) -> bool:
         """Add what a token declares; return whether it declares something."""
@@ -293,6 +293,10 @@ class Graph:
     def _remove(self, token: str) -> None:
         with self._lock:
             self.changes += self._known.pop(token, None) is not None
+
+
+def _in_order(endpoints: Iterable[EndpointInfo]) -> tuple[EndpointInfo, ...]:
+    return tuple(sorted(endpoints, key=lambda e: (e.name, e.node, e.kind, e.gid)))
 
 
 def _types_by_name(pairs: Iterable[tuple[str, str]]) -> dict[str, tuple[str, ...]]:

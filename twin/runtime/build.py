@@ -36,7 +36,7 @@ from twin.runtime.topics import topic_types
 from twin.savings import ALL, Savings
 from twin.scenario.faults import titles
 from twin.scenario.localisation import AmclLocalisation
-from twin.scenario.missions import PickAndPlace
+from twin.scenario.missions import PickAndPlace, Tasks
 from twin.scenario.observation import CheckContext, Zone
 from twin.scenario.outside import ALONE, Outside
 from twin.scenario.robots import RobotConfig
@@ -257,7 +257,9 @@ def _scene(scenario: Scenario, arena: Arena | None, comers: Sequence[Obstacle]) 
             shadows=scenario.world.shadows,
         )
     carriers = (mission for mission in scenario.tasks if isinstance(mission, PickAndPlace))
-    totes = (task.tote for mission in carriers for task in mission.tasks)
+    totes = [task.tote for mission in carriers for task in mission.tasks]
+    if any(isinstance(mission, Tasks) for mission in scenario.tasks):
+        totes += arena.totes  # others may ask for each
     given = {good.name: good.properties for good in scenario.world.goods}
     scene = arena.scene({*given, *totes}, seed=scenario.seed, obstacles=statics)
     goods = [replace(good, **given.get(good.name, {})) for good in scene.goods]

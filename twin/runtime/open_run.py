@@ -38,12 +38,15 @@ from twin.scenario.verdict import Images, Label, Verdict
 if TYPE_CHECKING:
     from twin.bridge.bus import Bus
     from twin.bridge.clock import Clock
+    from twin.bridge.node import Node
     from twin.recording.live_screen import LiveScreen
     from twin.recording.sink import RerunSink
     from twin.sim.world import World
 
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
+_HELD_S = 0.1
+"""How long a run that is held waits for somebody to say something, by the clock on the wall."""
 _left: list[object] = []
 """What belongs to the process of which this one is a fork."""
 _SHOWN_S = 0.25
@@ -133,7 +136,11 @@ class OpenRun:
         self._finished: str | None = None
         self._endless = endless
         self.between_ticks: list[Callable[[], None]] = []
-        """Called after each tick of `advance`."""
+        """Called after each tick of `advance`, and now and then while the run is held."""
+        self.is_held: Callable[[], bool] = lambda: False
+        """Asked between two ticks of `advance`: time stands while it holds."""
+        self.heard_when_held: Node | None = None
+        """Who hears what comes from outside then; None: everybody."""
         self.when_alone: list[Callable[[], None]] = []
         """Called in a fork that goes on alone, before its first tick."""
         self.label: Label = "model"
@@ -183,14 +190,25 @@ class OpenRun:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
                 self._sink.declare(parts.world, wheels, _cameras(parts), _depths(parts))
-            self._pace = kept = Pace(pace) if isinstance(pace, int | float) else pace
-            if kept is not None:
-                world = parts.world
-                self.run.wait = lambda: kept.keep(world.time_ns * 1e-9)
+            self._pace: Pace | None = None
+            if pace is not None:
+                self._keep(Pace(pace) if isinstance(pace, int | float) else pace)
             self._ending = ending.pop_all()
             if out is not None and not endless:
                 self._ending.callback(lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
+
+    def _keep(self, pace: Pace) -> None:
+        world = self.run.world
+        self._pace = pace
+        self.run.wait = lambda: pace.keep(world.time_ns * 1e-9)
+
+    def go_on(self, factor: float) -> None:
+        """Go on from now at so many simulated seconds per second; infinite is as fast as possible."""
+        if self._pace is None:
+            self._keep(Pace(factor))
+        assert self._pace is not None
+        self._pace.go_on(self.run.world.time_ns * 1e-9, factor)
 
     @property
     def due_ns(self) -> int | None:
@@ -221,8 +239,7 @@ class OpenRun:
                 run.tick()
                 if not self._endless and run.world.time_ns >= self.digest.second_ends_ns:
                     self.digest.end_second(run.world.state_digest())
-                for each in self.between_ticks:
-                    each()
+                self._between_ticks()
                 if until is not None and until():
                     return True
                 if progress is not None and time.perf_counter() - shown > _SHOWN_S:
@@ -237,6 +254,15 @@ class OpenRun:
                         )
                     )
             return False
+
+    def _between_ticks(self) -> None:
+        for each in self.between_ticks:
+            each()
+        while self.is_held():
+            self.run.bus.external.wait(_HELD_S)
+            self.run.bus.serve(self.heard_when_held)
+            for each in self.between_ticks:
+                each()
 
     def advance_to_agent(self, until: Callable[[], bool]) -> bool:
         """Go on until a condition holds at an agent's place in a tick, or the run is over; see `Run.think`.
@@ -308,7 +334,7 @@ class OpenRun:
         _left.append((self._ending.pop_all(), self._sink, self._observers))
         self._sink = self._pace = self._out = None
         self.run.wait = lambda: None
-        self.between_ticks = []
+        self.between_ticks, self.is_held = [], lambda: False
         for each in self.when_alone:
             each()
 

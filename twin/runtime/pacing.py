@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -21,7 +22,7 @@ class Pace:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Start at simulated time 0 with `factor` simulated seconds per second."""
+        """Start at simulated time 0 with `factor` simulated seconds per second; infinite is no pace."""
         self._factor, self._slack_s = factor, slack_s
         self._clock, self._sleep = clock, sleep
         self._start = clock()
@@ -36,12 +37,19 @@ class Pace:
         """Let simulated time 0 be now."""
         self._start = self._clock()
 
+    def go_on(self, simulated_s: float, factor: float) -> None:
+        """Let a simulated time be now, and go on at another factor; that the run stood still is no loss."""
+        self._factor, self._is_kept = factor, True
+        self._start = self._clock() - simulated_s / factor
+
     def due_s(self, simulated_s: float) -> float:
         """Return when a simulated time is due, by the clock [s]."""
         return self._start + simulated_s / self._factor
 
     def keep(self, simulated_s: float) -> None:
         """Wait until the time of a simulated one has come."""
+        if math.isinf(self._factor):
+            return
         ahead = self.due_s(simulated_s) - self._clock()
         if ahead > 0.0:
             self._is_kept = True

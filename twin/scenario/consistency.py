@@ -17,6 +17,7 @@ from twin.scenario.missions import (
     PickAndPlace,
     R2D2StatePublisher,
     RandomGoals,
+    Tasks,
 )
 from twin.strict_yaml import Fault, Loc
 
@@ -137,7 +138,7 @@ def _mission(scenario: Scenario, mission: Task, loc: Loc) -> Iterator[Fault]:
     if isinstance(mission, Explore) and not (maps and robot.navigation is not None):
         needs = f"needs a navigation of robot '{robot.id}' and its localisation of type slam"
         yield Fault(at, f"the mission explore {needs}")
-    if isinstance(mission, PickAndPlace | RandomGoals) and robot.navigation is None:
+    if isinstance(mission, PickAndPlace | RandomGoals | Tasks) and robot.navigation is None:
         yield Fault(at, f"the mission {mission.type} needs a navigation of robot '{robot.id}'")
     if isinstance(mission, RandomGoals) and not isinstance(robot.localisation, AmclLocalisation):
         yield Fault(at, f"the mission random_goals needs a robot on a map: localisation amcl of '{robot.id}'")
@@ -194,6 +195,8 @@ def _checks(scenario: Scenario) -> Iterator[Fault]:
     by_name = {robot.id: robot for robot in scenario.robots}
     carriers = [mission for mission in scenario.tasks if isinstance(mission, PickAndPlace)]
     totes = [task.tote for mission in carriers for task in mission.tasks]
+    queues = [mission for mission in scenario.tasks if isinstance(mission, Tasks)]
+    totes += [task.carry.tote for queue in queues for task in queue.tasks if task.carry is not None]
     idle = all(isinstance(mission, Idle) for mission in scenario.tasks)
     for i, entry in enumerate(scenario.checks):
         loc, subjects = ("checks", i, entry.kind), entry.subjects()

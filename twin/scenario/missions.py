@@ -13,6 +13,7 @@ from pydantic import (
     TypeAdapter,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
+    model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
 
@@ -45,7 +46,7 @@ class PickAndPlaceTask(StrictModel):
     tote: str
     """Name of the tote in the arena."""
     to: str
-    """Name of the arena's zone to put it down in."""
+    """Name of the arena's zone to put it down in, in the mission tasks also a slot of its table."""
 
 
 class PickAndPlace(StrictModel):
@@ -148,6 +149,68 @@ class Behaviors(StrictModel):
     """The behaviours, in this order."""
     repeat: Annotated[int, Positive] = 1
     """How often to run all steps."""
+
+
+class DriveTo(StrictModel):
+    """Drive to a named place, or to a pose in `map`."""
+
+    place: str = ""
+    """One of the arena's poses or zones; absent: x and y."""
+    x: Metres | None = None
+    """Goal along x [m]."""
+    y: Metres | None = None
+    """Goal along y [m]."""
+    yaw: Radians = 0.0
+    """Goal heading [rad]."""
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> DriveTo:
+        given = self.model_fields_set
+        if bool(self.place) == bool(given & {"x", "y", "yaw"}) or (
+            not self.place and not {"x", "y"} <= given
+        ):
+            raise ValueError("must have either a place, or x and y")
+        return self
+
+
+class DockAt(StrictModel):
+    """Drive to a dock of `robots[].navigation.docking.docks` and dock."""
+
+    dock: str
+    """Its name."""
+
+
+class Undock(StrictModel):
+    """Leave the dock."""
+
+
+class QueuedTask(OneOf):
+    """One task: exactly one of these keys."""
+
+    drive_to: DriveTo | None = None
+    """Drive to a place."""
+    carry: PickAndPlaceTask | None = None
+    """Carry a tote."""
+    dock: DockAt | None = None
+    """Drive to a dock and dock."""
+    undock: Undock | None = None
+    """Leave the dock."""
+    wait: Wait | None = None
+    """Stand still."""
+
+
+class Tasks(StrictModel):
+    """Do tasks one after the other: those listed, and those that others add while the run goes on."""
+
+    type: Literal["tasks"]
+    """`tasks`"""
+    robot: str
+    """Name of the robot."""
+    tasks: tuple[QueuedTask, ...] = ()
+    """With which it begins, in this order."""
+    waits_for_more: bool = True
+    """Whether it goes on when nothing is left to do; else it is done then, and has failed with the first
+    task that fails."""
 
 
 @keys_of(RandomGoalsConfig, whole=True)
@@ -264,7 +327,7 @@ class _OrAUsers:
         return UserMission.model_validate({**data, "type": used.reference}, strict=True)
 
 
-_Tasks = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore
+_Tasks = PickAndPlace | Behaviors | RandomGoals | VelocityProfile | R2D2StatePublisher | Explore | Tasks
 _Ships = _Tasks | Idle
 _BY_NAME = {get_args(one.model_fields["type"].annotation)[0]: one for one in get_args(_Ships)}
 for _name in _BY_NAME:

@@ -48,9 +48,10 @@ class PickAndPlaceNode(MobileManipulationNode):
 
     def carry(self, tasks: Sequence[PickAndPlaceTask]) -> None:
         """Begin with the first of the tasks."""
-        self.run(sequence("PickAndPlace", [self._task(task) for task in tasks]), 100_000_000)
+        self.run(sequence("PickAndPlace", [self.task(task) for task in tasks]), 100_000_000)
 
-    def _task(self, task: PickAndPlaceTask) -> TreeNode:
+    def task(self, task: PickAndPlaceTask) -> TreeNode:
+        """Return what carries a tote from where it stands."""
         carry_z, tote = self.config.carry_z, task.tote
         give_up = [
             self.detect("StopLooking", enabled=False),
@@ -74,18 +75,33 @@ class PickAndPlaceNode(MobileManipulationNode):
                 self.stow(carry_z),
                 self.drive_to(tote.slot),
                 pick,
-                self.holding(tote, [*self._carry(task), *self._set_down(task)]),
-                self.report(f"{tote.name}: release"),
-                self.open_gripper(),
-                self.report(f"{tote.name}: back off"),
-                self.retract(),
-                self.undock_from("table"),
-                self.stow(carry_z),
+                self.holding(tote, [*self._leave(task), *self._carry(task), *self._set_down(task)]),
+                *self._release(task),
+            ],
+        )
+
+    def rest_of(self, task: PickAndPlaceTask) -> TreeNode:
+        """Return what carries the tote that the gripper holds, after `put_away`."""
+        carried = self.holding(task.tote, [*self._carry(task), *self._set_down(task)])
+        return sequence(task.tote.name, [carried, *self._release(task)])
+
+    def put_away(self) -> TreeNode:
+        """Return what makes the robot ready to drive wherever it was broken off; it keeps what it holds."""
+        carry_z, held = self.config.carry_z, self.holds is not None
+        fingers = self.raise_by("LiftOff", self.config.lift_off) if held else self.open_gripper()
+        return sequence(
+            "PutAway",
+            [
+                self.detect("StopLooking", enabled=False),
+                fingers,
+                self.retract(loaded=held),
+                *([self.undock_from("shelf")] if self.is_docked else []),
+                self.move_to_height("LowerToCarry", carry_z, loaded=held),
             ],
         )
 
     def _pick(self, tote: Tote) -> TreeNode:
-        surface, (depth, width, height) = tote.slot.height, tote.size
+        surface, (depth, _, height) = tote.slot.height, tote.size
         grasp_z = surface + height / 2.0
         return sequence(
             "Pick",
@@ -101,7 +117,7 @@ class PickAndPlaceNode(MobileManipulationNode):
                 self.report(f"{tote.name}: reach"),
                 self.reach_for_tote(grasp_z, depth),
                 self.report(f"{tote.name}: grasp"),
-                self.close_on(width),
+                self.close_on(tote),
                 self.holding(
                     tote,
                     [
@@ -113,11 +129,15 @@ class PickAndPlaceNode(MobileManipulationNode):
             ],
         )
 
-    def _carry(self, task: PickAndPlaceTask) -> list[TreeNode]:
+    def _leave(self, task: PickAndPlaceTask) -> list[TreeNode]:
         return [
             self.report(f"{task.tote.name}: back off"),
             self.undock_from("shelf"),
             self.move_to_height("LowerToCarry", self.config.carry_z, loaded=True),
+        ]
+
+    def _carry(self, task: PickAndPlaceTask) -> list[TreeNode]:
+        return [
             self.report(f"{task.tote.name}: carry to {task.place.name}"),
             self.drive_to(task.place),
         ]
@@ -140,4 +160,14 @@ class PickAndPlaceNode(MobileManipulationNode):
             self.move_to_height("RaiseToPlace", above, loaded=True),
             self.reach("ReachToPlace", x, above, loaded=True),
             self.move_to_height("Lower", set_down, loaded=True),
+        ]
+
+    def _release(self, task: PickAndPlaceTask) -> list[TreeNode]:
+        return [
+            self.report(f"{task.tote.name}: release"),
+            self.open_gripper(),
+            self.report(f"{task.tote.name}: back off"),
+            self.retract(),
+            self.undock_from("table"),
+            self.stow(self.config.carry_z),
         ]

@@ -100,6 +100,12 @@ class MobileManipulationNode(MissionNode):
         self._totes: list[Pose2] = []
         self._joint_states = new(JointState)
         self._grip_effort = 0.0
+        self.holds: Tote | None = None
+        """What the fingers have closed on, and not lost."""
+        self.gripped: set[str] = set()
+        """Names of all that they have closed on."""
+        self.is_docked = False
+        """Whether the robot has docked, and not backed off since."""
         node = self.node
         self._navigate = ActionClient(node, NavigateToPose, "navigate_to_pose")
         self._dock = ActionClient(node, DockRobot, "dock_robot")
@@ -153,6 +159,10 @@ class MobileManipulationNode(MissionNode):
     def dock_at(self, slot: Slot, dock_type: str) -> TreeNode:
         """Dock at a slot; `tote` centres the robot on the tote there, `table` on the plan's point."""
         docked = slot.approach(0.0) @ Pose2(-self.skills.docked_distance, 0.0, 0.0)
+
+        def done(result: Any) -> None:
+            self.is_docked = True
+
         return self._call(
             f"Dock[{slot.name}]",
             self._dock,
@@ -163,12 +173,17 @@ class MobileManipulationNode(MissionNode):
                 dock_type=dock_type,
                 navigate_to_staging_pose=False,
             ),
+            done,
         )
 
     def undock_from(self, dock_type: str) -> TreeNode:
         """Back off to the staging distance."""
         goal = new(UndockRobot.Goal, dock_type=dock_type)
-        return self._call("Undock", self._undock, lambda: goal)
+
+        def done(result: Any) -> None:
+            self.is_docked = False
+
+        return self._call("Undock", self._undock, lambda: goal, done)
 
     # Looking
 
@@ -186,6 +201,15 @@ class MobileManipulationNode(MissionNode):
         """Bring the grasp frame to height z [m]."""
         config = self._arm.config
         return self.move(name, lambda: {config.lift_joint: z - config.grasp_z}, loaded=loaded)
+
+    def raise_by(self, name: str, height: float) -> TreeNode:
+        """Raise what the gripper holds, as far as the lift goes [m]."""
+        joint = self._arm.config.lift_joint
+
+        def target() -> dict[str, float]:
+            return {joint: min(self._measured("position")[joint] + height, self._arm.limits[joint].upper)}
+
+        return self.move(name, target, loaded=True)
 
     def retract(self, *, loaded: bool = False) -> TreeNode:
         """Bring the gripper back over the deck."""
@@ -244,14 +268,21 @@ class MobileManipulationNode(MissionNode):
 
     def open_gripper(self) -> TreeNode:
         """Open the fingers fully."""
-        return self._call("OpenGripper", self._gripper, lambda: self._gripper_goal(self._gripper_open))
 
-    def close_on(self, width: float) -> TreeNode:
-        """Close the fingers; fails unless they stall on something of this width [m]."""
+        def done(result: Any) -> None:
+            self.holds = None
+
+        return self._call("OpenGripper", self._gripper, lambda: self._gripper_goal(self._gripper_open), done)
+
+    def close_on(self, tote: Tote) -> TreeNode:
+        """Close the fingers; fails unless they stall on something of the tote's width."""
+        width = tote.size[1]
 
         def judge(result: Any) -> str | None:
             self._grip_effort = result.effort
             if result.stalled and abs(result.position - width / 2.0) < self.skills.grip_tolerance:
+                self.holds = tote
+                self.gripped.add(tote.name)
                 return None
             return f"gripper closed on nothing of {width:.2f} m width: finger at {result.position:.3f} m"
 
@@ -269,6 +300,7 @@ class MobileManipulationNode(MissionNode):
             if fault is not None:
                 pose = self._robot_pose.in_map()
                 place = "" if pose is None else f", at ({pose.x:.2f}, {pose.y:.2f})"
+                self.holds = None
                 self.note(f"lost {what} at {self.node.now_ns * 1e-9:.1f} s{place}: {fault}")
             return fault is None
 

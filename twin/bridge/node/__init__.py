@@ -291,6 +291,15 @@ class Node(NodeParameters, NodeGraph):
                 due_ns = its_ns
         self.due_ns = due_ns
 
+    def hear(self, receiver: object) -> None:
+        """Handle what waits for one endpoint, and nothing else."""
+        waiting = list(self.inbox)
+        self.inbox.clear()
+        self.inbox.extend(entry for entry in waiting if entry[0] is not receiver)
+        for endpoint, data, external in waiting:
+            if endpoint is receiver:
+                endpoint.handle(data, external)
+
     def wake(self) -> None:
         """Spin the next time: what is due has changed."""
         self.due_ns = 0

@@ -16,6 +16,7 @@ from twin.bridge.wire.external import Arrival
 from twin.bridge.wire.keys import Attachment
 from twin.errors import SimulationError
 from twin.live.futures import names
+from twin.runtime import simulation_control
 from twin.runtime.open_run import OpenRun
 
 Kind = Literal["message", "request", "response"]
@@ -73,8 +74,8 @@ class Inputs:
         if kind is None:
             self.lacking = receiver.name
             return
-        node: Node = receiver.node  # type: ignore[attr-defined]
-        if node.fully_qualified_name == names.NODE:
+        node = receiver.node
+        if node.fully_qualified_name in (names.NODE, simulation_control.NODE):
             return
         payload = data.payload if kind == "request" else data[0 if kind == "message" else 1]
         owner, name = node.fully_qualified_name, receiver.name

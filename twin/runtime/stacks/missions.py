@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from twin.bridge import types
 from twin.bridge.action_types import (
     BackUp,
     DockRobot,
@@ -19,7 +20,7 @@ from twin.bridge.action_types import (
 from twin.bridge.bus import Bus
 from twin.bridge.msgs import Point, duration, new
 from twin.bridge.types import ActionType
-from twin.errors import ScenarioError
+from twin.errors import ScenarioError, TaskError
 from twin.geometry import Pose2
 from twin.nodes.messages import pose_stamped
 from twin.nodes.missions.mission_node import MissionNode
@@ -35,16 +36,20 @@ from twin.scenario.missions import (
     Idle,
     Mission,
     PickAndPlace,
+    QueuedTask,
     R2D2StatePublisher,
     RandomGoals,
     Task,
+    Tasks,
     UserMission,
     VelocityProfile,
 )
 from twin.strict_yaml import StrictModel
 
 if TYPE_CHECKING:
+    from twin.runtime.defaults.from_description import Manipulator
     from twin.warehouse.arena import Arena
+    from twin.warehouse.pick_and_place import PickAndPlaceNode
 
 
 class IdleMission:
@@ -233,7 +238,7 @@ def explore(context: MissionContext, mission: Explore) -> MissionNode:
 
 def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNode:
     """Return the drive from tote to tote."""
-    from twin.warehouse.pick_and_place import PickAndPlaceNode, PickAndPlaceTask
+    from twin.warehouse.pick_and_place import PickAndPlaceTask
 
     stack, arena = context.robot, context.arena
     assert arena is not None  # as the scenario's checks say
@@ -253,13 +258,69 @@ def pick_and_place(context: MissionContext, mission: PickAndPlace) -> MissionNod
                 f"zone '{task.to}' has room for {len(zone.slots)} totes; the mission brings it more"
             )
         tasks.append(PickAndPlaceTask(tote=tote, place=zone.slots[index]))
-    node = PickAndPlaceNode(
-        context.bus,
-        stack.manipulator.arm,
-        gripper_joint=stack.manipulator.gripper_joint,
-        gripper_open=stack.manipulator.gripper_open,
-        robot_pose=stack.robot_pose,
-        namespace=context.namespace,
-    )
+    node = _carrier(context, stack.manipulator)
     node.carry(tasks)
     return node
+
+
+def _carrier(context: MissionContext, manipulator: Manipulator) -> PickAndPlaceNode:
+    from twin.warehouse.pick_and_place import PickAndPlaceNode
+
+    return PickAndPlaceNode(
+        context.bus,
+        manipulator.arm,
+        gripper_joint=manipulator.gripper_joint,
+        gripper_open=manipulator.gripper_open,
+        robot_pose=context.robot.robot_pose,
+        namespace=context.namespace,
+    )
+
+
+def tasks(context: MissionContext, mission: Tasks) -> MissionNode:
+    """Return a queue of tasks: of those that are listed, and of those that others add."""
+    from twin.navigation.costmaps import footprint as footprints
+    from twin.nodes.missions.tasks.kinds import Dock, DriveTo, TaskKind, Undock, WaitFor
+    from twin.nodes.missions.tasks.server import TaskServer
+
+    stack, arena = context.robot, context.arena
+    kinds: list[TaskKind] = []
+    if arena is not None and stack.manipulator is not None:
+        from twin.warehouse.carrying import Carry
+
+        node: MissionNode = (carrier := _carrier(context, stack.manipulator))
+        kinds.append(Carry(carrier, arena))
+    else:
+        node = MissionNode(context.bus, namespace=context.namespace)
+    places = {} if arena is None else {name: zone.pose for name, zone in arena.zones.items()}
+    places |= {} if arena is None else arena.poses
+    inscribed, _ = footprints.radii(stack.footprint)
+    kinds += [DriveTo(node, stack.robot_pose, places, inscribed), WaitFor(node)]
+    navigation = stack.context.config.navigation
+    docks = {} if navigation is None else navigation.docking.docks
+    if docks:
+        here = {name: dock.pose.pose for name, dock in docks.items() if dock.frame == stack.frames.map}
+        kinds += [Dock(node, here), Undock(node)]
+    server = TaskServer(node, kinds, stack.robot_pose, waits_for_more=mission.waits_for_more)
+    for index, step in enumerate(mission.tasks):
+        try:
+            server.add(_task(step, stack))
+        except TaskError as error:
+            raise ScenarioError(f"task {index + 1} of robot '{stack.name}': {error}") from None
+    return node
+
+
+def _task(step: QueuedTask, stack: RobotStack) -> Any:
+    """Return a task of a scenario as its message."""
+    fields: dict[str, Any] = {}
+    match step.config:
+        case missions.DriveTo(place="", x=float(x), y=float(y), yaw=yaw):
+            fields["pose"] = pose_stamped(Pose2(x, y, yaw), stack.frames.map, 0)
+        case missions.DriveTo(place=place):
+            fields["place"] = place
+        case missions.PickAndPlaceTask(tote=tote, to=to):
+            fields |= {"tote": tote, "to": to}
+        case missions.DockAt(dock=dock):
+            fields["dock"] = dock
+        case missions.Wait(duration=seconds):
+            fields["duration"] = duration(round(seconds * 1e9))
+    return new(types.get("twin_msgs/msg/Task"), type=step.kind, **fields)

@@ -25,14 +25,17 @@ _READING = (
     "/rosapi/*", "/twin/control", "*/get_parameters", "*/get_parameter_types", "*/list_parameters",
     "*/describe_parameters", "*/get_type_description", "*/get_state", "*/get_available_*", "*/get_map",
     "*/get_costmap", "*/get_cost", "*/map_server/map", "*/is_path_valid", "*/tf2_frames", "/republish_tfs",
+    "/get_simulation_state", "/get_simulator_features",
 )  # fmt: skip
+_TASKS = ("*/add_task", "*/cancel_task", "*/move_task", "*/clear_tasks", "*/pause_tasks", "*/resume_tasks")
+_SIMULATION = ("/set_simulation_state", "/reset_simulation", "/step_simulation", "/simulation/set_speed")
 _CHANGING = ("/rosapi/set_param", "/rosapi/delete_param")
 _OPERATING = (
     "*/add_shapes", "*/remove_shapes",
     "*/guard/stop", "*/guard/release", "*/clear_*", "*/reinitialize_global_localization",
     "*/set_initial_pose", "*/toggle", "/clear", "/reset", "/spawn", "/kill",
     "*/teleport_absolute", "*/teleport_relative", "*/set_pen",
-    "*/add_task", "*/cancel_task", "*/pause", "*/resume", "*/_action/cancel_goal", "*/acknowledge*",
+    "*/pause", "*/resume", "*/_action/cancel_goal", "*/acknowledge*", *_TASKS, *_SIMULATION,
 )  # fmt: skip
 _TALKING = (
     "*/cmd_vel*", "*/teleop", "*/initialpose", "*/goal_pose", "*/clicked_point", "*/joy", "*/waypoints",
@@ -52,8 +55,8 @@ STEERING_TOPICS = (
 STEERING_SERVICES = (
     "*/add_shapes", "*/remove_shapes",
     "*/guard/release", "*/reinitialize_global_localization", "*/set_initial_pose", "*/toggle",
-    "*/teleport_absolute", "*/teleport_relative", "*/add_task", "*/cancel_task", "*/pause", "*/resume",
-    "*/_action/send_goal", "*/_action/cancel_goal",
+    "*/teleport_absolute", "*/teleport_relative", "*/pause", "*/resume",
+    "*/_action/send_goal", "*/_action/cancel_goal", *_TASKS, *_SIMULATION,
 )  # fmt: skip
 """Services by which a robot is steered; those of other programs need a role, and no control."""
 

@@ -104,9 +104,11 @@ class Source:
         gid = sample.source.gid
         if gid not in self._retained:
             qos = next((p.qos for p in self._graph.publishers(self._topic) if p.gid == gid), None)
-            if qos is None or qos.durability != "transient_local":
+            if qos is None:
                 return
-            self._retained[gid] = deque(maxlen=min(qos.depth, _RETAINED))
+            # Of others nothing is kept; that they are none is, as to ask the graph for every message is dear.
+            most = min(qos.depth, _RETAINED) if qos.durability == "transient_local" else 0
+            self._retained[gid] = deque(maxlen=most)
             if len(self._retained) > _MOST_PUBLISHERS:
                 self._retained.popitem(last=False)
         self._retained[gid].append(heard)

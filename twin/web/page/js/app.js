@@ -7,14 +7,15 @@ import { Drive } from "./drive.js";
 import { HistoryBar, Mission } from "./history.js";
 import { MapCanvas } from "./map.js";
 import { Rosbridge } from "./rosbridge.js";
+import { Simulation, stands } from "./simulation.js";
 import { Station } from "./station.js";
+import { Tasks } from "./tasks.js";
 import { yawOf } from "./transforms.js";
-import { wordsOf } from "./words.js";
+import { clock, wordsOf } from "./words.js";
 
 const SILENT_S = 2;
 const kept = (key, otherwise) => localStorage.getItem(`twin.${key}`) ?? otherwise;
 const keep = (key, value) => localStorage.setItem(`twin.${key}`, value);
-const clock = (seconds) => seconds === null || seconds === undefined ? "–" : `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
 function EmergencyStop({ station, t }) {
   const dialog = useRef();
@@ -47,14 +48,14 @@ function Control({ station, t }) {
 }
 
 function Header({ station, t, theme, setTheme, language, setLanguage }) {
-  const age = (performance.now() - station.ros.heard) / 1000, up = station.ros.connected, silent = up && age > SILENT_S;
+  const age = (performance.now() - station.ros.heard) / 1000, up = station.ros.connected, paused = stands(station), silent = up && !paused && age > SILENT_S;
   const { time, factor } = station.clock;
   return html`
     <header>
       <div class="brand"><img src="icon.svg" alt="" width="28" height="28" /><h1>${t("title")}</h1>
         ${station.robot?.label && html`<span class="badge">${station.robot.label}</span>`}</div>
-      <div class="lamp ${up ? (silent ? "warn" : "good") : "bad"}" role="status"><span class="dot"></span>
-        <span class="lamp-words">${up ? (silent ? `${t("silent")} ${age.toFixed(0)} s` : t("connected")) : t("disconnected")}</span></div>
+      <div class="lamp ${up ? (silent || paused ? "warn" : "good") : "bad"}" role="status"><span class="dot"></span>
+        <span class="lamp-words">${up ? (silent ? `${t("silent")} ${age.toFixed(0)} s` : t(paused ? "paused" : "connected")) : t("disconnected")}</span></div>
       <dl class="figures wide"><div><dt>${t("time")}</dt><dd>${clock(time)}</dd></div>
         <div><dt>${t("pace")}</dt><dd>${factor === null ? "–" : `${factor.toFixed(1)}×`}</dd></div></dl>
       ${station.robots.size > 1 && html`<select aria-label=${t("robot")} value=${station.selected} onChange=${(event) => station.select(event.target.value)}>
@@ -87,30 +88,6 @@ function RobotCard({ station, t }) {
       ${charge >= 0 && html`<span class="battery ${charge < 0.2 ? "bad" : ""}">${t("battery")} <meter min="0" max="1" low="0.2" value=${charge} aria-label=${t("battery")}></meter> ${Math.round(charge * 100)} %</span>`}</div>
     <dl class="figures grid">${figures.map(([name, value]) => html`<div><dt>${name}</dt><dd>${value}</dd></div>`)}</dl>
   </section>`;
-}
-
-function Tasks({ station, t }) {
-  const states = station.robot?.mission ?? [];
-  const add = (event) => {
-    event.preventDefault();
-    const value = (name) => Number(event.target.elements[name].value) || 0;
-    station.add(value("x"), value("y"), (value("heading") * Math.PI) / 180);
-  };
-  return html`
-    <h3>${t("mission")}</h3>
-    ${states.length ? html`<ol class="steps">${states.slice(-8).map((step, i, all) => html`<li class=${i === all.length - 1 ? "now" : ""}><time>${clock(step.time)}</time> ${step.state}</li>`)}</ol>` : html`<p class="muted">${t("noMission")}</p>`}
-    <h3>${t("queue")}</h3>
-    <p class="muted">${t("queueNote")}</p>
-    ${station.queue.length === 0 && html`<p class="muted">${t("empty")}</p>`}
-    <ul class="list" id="queue">${station.queue.map((goal) => html`<li key=${goal.id} data-state=${goal.state}>
-      <div class="grow"><b>${goal.x.toFixed(2)}, ${goal.y.toFixed(2)}</b> · ${Math.round((goal.yaw * 180) / Math.PI)}°<br />
-        <span class="state ${goal.state}">${t(goal.state === "waiting" ? "state_waiting" : goal.state)}${goal.state === "active" && goal.left !== undefined ? ` · ${goal.left.toFixed(1)} ${t("left")}` : ""} ${goal.why ?? ""}</span></div>
-      ${goal.state === "waiting" && html`<button class="icon" aria-label=${t("earlier")} onClick=${() => station.move(goal.id, -1)}>↑</button><button class="icon" aria-label=${t("later")} onClick=${() => station.move(goal.id, 1)}>↓</button>`}
-      <button class="icon" aria-label=${t("cancel")} onClick=${() => station.cancel(goal.id)}>✕</button></li>`)}</ul>
-    <form class="row" onSubmit=${add}>
-      ${["x", "y", "heading"].map((name) => html`<label class="small">${t(name)}<input name=${name} type="number" step="any" value="0" /></label>`)}
-      <button>${t("add")}</button></form>
-    ${station.holding ? html`<button onClick=${() => station.resumeQueue()}>${t("resume")}</button>` : station.queue.length > 0 && html`<button onClick=${() => station.pauseQueue()}>${t("hold_")}</button>`}`;
 }
 
 function Alarms({ station, t }) {
@@ -190,12 +167,13 @@ function App({ station }) {
   const [theme, setTheme] = useState(kept("theme", matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
   const [panel, setPanel] = useState("drive");
   useEffect(() => { station.addEventListener("change", refresh); return () => station.removeEventListener("change", refresh); }, []);
+  useEffect(() => { station.addEventListener("proposal", () => setPanel("tasks")); }, []);
   useEffect(() => { document.documentElement.lang = language; keep("language", language); }, [language]);
   useEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
   const t = wordsOf(language), props = { station, t };
   return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
     <${Banner} ...${props} />
-    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
+    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><${Simulation} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }
 
 const token = new URLSearchParams(location.search).get("token");

@@ -1,6 +1,7 @@
 /** The hall from above, on a canvas: grids, scan, plan, robots; goals and poses are set by click and drag. */
 
 import { html, useLayoutEffect, useRef } from "ui";
+import { drawTasks } from "./tasks.js";
 import { compose, place, poseOf, yawOf } from "./transforms.js";
 
 const DRAG_PX = 8;
@@ -139,6 +140,7 @@ export class MapView {
     if (this.layers.zones) station.zones.draw(this, c, colour);
     this._things(c, robot, robot.goods, 0.15, colour("goods"));
     this._things(c, robot, robot.people, 0.25, colour("people"));
+    drawTasks(c, this, robot, colour);
     station.queue.filter((goal) => goal.state === "active" || goal.state === "waiting").forEach((goal, i) => this._flag(c, [goal.x, goal.y], goal.yaw, colour("accent"), goal.state === "active" ? "" : String(i + 1)));
     for (const each of station.robots.values()) this._robot(c, each, each === robot, colour);
     if (this.drag) this._flag(c, this.world(...this.drag.from), this._heading(), colour(this.tool === "pose" ? "good" : "accent"), "");

@@ -1,5 +1,6 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
+import { addPlace } from "./tasks.js";
 import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
 import { TiledGrid, WholeGrid } from "./grids.js";
 import { HISTORY, takeHistory } from "./history.js";
@@ -210,6 +211,9 @@ export class Station extends EventTarget {
         if (msg.level >= 40) this.alarm(`log ${msg.name}`, "error", `${msg.name}: ${msg.msg}`);
       });
     else if (topic === "/clock") hear((msg) => this._time(msg.clock), 500);
+    else if (type === "twin_msgs/msg/TaskQueue") owned((robot, msg) => (robot.tasks = msg));
+    else if (type === "twin_msgs/msg/Places") owned((robot, msg) => (robot.places = msg.places));
+    else if (topic === "/simulation/state") hear((msg) => this._simulated(msg));
     else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
   }
 
@@ -247,6 +251,16 @@ export class Station extends EventTarget {
     const { time: before, at } = this.clock;
     const factor = before !== null && now > at ? (time - before) / (now - at) : null;
     this.clock = { time, at: now, factor: this.clock.factor === null ? factor : 0.7 * this.clock.factor + 0.3 * factor };
+  }
+
+  /** Take how the simulation goes on; one that begins anew has no past. */
+  _simulated(message) {
+    if (this.simulation && this.simulation.resets !== message.resets) {
+      this.robots.forEach((robot) => Object.assign(robot, { mission: [], plan: undefined }));
+      this.clock = { time: null, factor: null };
+      this.note("info", "simulation", "reset");
+    }
+    this.simulation = message;
   }
 
   _guard(robot, message) {
@@ -320,8 +334,19 @@ export class Station extends EventTarget {
     this.note("info", "page", `2D pose estimate ${x.toFixed(2)} ${y.toFixed(2)} ${yaw.toFixed(2)}`);
   }
 
+  /** Propose a task, for an operator to complete. */
+  propose(task) {
+    this.draft = task;
+    this.dispatchEvent(new Event("proposal"));
+    this.changed();
+  }
+
   /** Put a goal at the end of the queue, or in place of all of it. */
   add(x, y, yaw, { now = false } = {}) {
+    if (this.robot.tasks) {
+      addPlace(this, x, y, yaw, now);
+      return;
+    }
     if (now) this.clear();
     this.queue.push({ id: ++this._goals, robot: this.robot, x, y, yaw, state: "waiting" });
     if (now) this.holding = false;

@@ -18,6 +18,9 @@ const WORDS = {
     controlMine: "You have control", controlNone: "Nobody has control", controlOther: "has control", takeOver: "Take over", take: "Take control", giveBack: "Give back", theme: "Dark or light", language: "中文",
     topic: "Topic", field: "Field", choose: "choose", noCamera: "No camera", mapLabel: "Map of the hall. Arrow keys move it, plus and minus zoom; goals can be typed under Tasks.", sceneLabel: "Robot in three dimensions",
     hintGoal: "Click where to go; drag for the heading", hintPose: "Click where the robot is; drag for its heading", hintWaypoint: "Click to add a goal to the queue; drag for the heading", panels: "Panels", tools: "Tools of the map", history: "Steps",
+    robotQueue: "Queue of tasks", robotQueueNote: "Kept at the robot: it goes on without this page.", noTasks: "No tasks. Add one, or choose Waypoint and click on the map.", held: "The queue is held", clearTasks: "Cancel all", taskType: "Task", place: "Place", tote: "Tote", to: "To", dock: "Dock", seconds: "Seconds",
+    task_drive_to: "Drive to", task_carry: "Carry", task_dock: "Dock at", task_undock: "Undock", task_wait: "Wait", task_waiting: "waiting", task_active: "under way:", task_succeeded: "done", task_failed: "failed:", task_canceled: "cancelled",
+    simulation: "Simulation", play: "Play", pause: "Pause", paused: "Paused", step: "Step", fastest: "fastest", reset: "Reset", resetAsk: "Reset the simulation?", resetText: "It begins anew at its start. What has been recorded so far is lost.",
   },
   zh: {
     past: "历史回放", pastTime: "录包时间", playBag: "播放", pauseBag: "暂停",
@@ -36,6 +39,9 @@ const WORDS = {
     controlMine: "您正在控制", controlNone: "无人控制", controlOther: "正在控制", takeOver: "接管", take: "取得控制", giveBack: "交还", theme: "深色或浅色", language: "English",
     topic: "话题", field: "字段", choose: "选择", noCamera: "没有相机", mapLabel: "厂房地图。方向键移动，加减号缩放；也可在任务面板输入目标。", sceneLabel: "机器人三维视图",
     hintGoal: "点击目的地，拖动设定朝向", hintPose: "点击机器人所在位置，拖动设定朝向", hintWaypoint: "点击添加到队列，拖动设定朝向", panels: "面板", tools: "地图工具", history: "步骤",
+    robotQueue: "任务队列", robotQueueNote: "队列保存在机器人端，关闭本页面后仍继续执行。", noTasks: "没有任务。请添加任务，或选择“航点”后点击地图。", held: "队列已暂停", clearTasks: "全部取消", taskType: "任务", place: "地点", tote: "货箱", to: "目的地", dock: "充电桩", seconds: "秒",
+    task_drive_to: "驶往", task_carry: "搬运", task_dock: "停靠", task_undock: "离开停靠", task_wait: "等待", task_waiting: "等待中", task_active: "进行中：", task_succeeded: "已完成", task_failed: "失败：", task_canceled: "已取消",
+    simulation: "仿真", play: "继续", pause: "暂停", paused: "已暂停", step: "单步", fastest: "最快", reset: "重置", resetAsk: "重置仿真？", resetText: "仿真将从头开始，此前的记录将丢失。",
   },
 };
 
@@ -44,4 +50,9 @@ export const LANGUAGES = Object.keys(WORDS);
 /** Return what gives the words of a language. */
 export function wordsOf(language) {
   return (key) => WORDS[language][key] ?? key;
+}
+
+/** Return a time [s] as minutes and seconds. */
+export function clock(seconds) {
+  return seconds === null || seconds === undefined ? "–" : `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }

@@ -1,0 +1,1 @@
+"""A robot's queue of tasks, which whoever takes part may add to."""
