@@ -173,7 +173,7 @@ function App({ station }) {
   const t = wordsOf(language), props = { station, t };
   return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
     <${Banner} ...${props} />
-    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} /><${Simulation} ...${props} /><div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
+    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} />${!station.history && html`<${Simulation} ...${props} />`}<div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }
 
 const token = new URLSearchParams(location.search).get("token");
