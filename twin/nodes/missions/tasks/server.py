@@ -73,6 +73,8 @@ class TaskServer:
         node.create_service(Trigger, "resume_tasks", lambda _: self._done(Trigger, self._resume))
         node.create_subscription(DiagnosticArray, "guard/status", self._on_guard, LATCHED)
         node.create_timer(PERIOD_NS, self._tick)
+        if waits_for_more:
+            mission.enter("waits for tasks")
         self._tell()
 
     def add(self, task: Any, position: int = 0) -> tuple[int, str]:
