@@ -256,8 +256,8 @@ class Bus:
             guard.deliver()
         for arrival in self.external.drain():
             self.enter(arrival)
-            node = arrival.receiver.node
-            if only is None or node is only:
+            node: Node | None = getattr(arrival.receiver, "node", None)  # none: it is in another process
+            if node is not None and only in (None, node):
                 node.hear(arrival.receiver)
 
     def enter(self, arrival: Arrival) -> None:

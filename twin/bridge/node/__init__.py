@@ -291,7 +291,7 @@ class Node(NodeParameters, NodeGraph):
                 due_ns = its_ns
         self.due_ns = due_ns
 
-    def hear(self, receiver: object) -> None:
+    def hear(self, receiver: Any) -> None:
         """Handle what waits for one endpoint, and nothing else."""
         waiting = list(self.inbox)
         self.inbox.clear()

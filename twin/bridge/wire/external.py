@@ -6,12 +6,9 @@ import logging
 import threading
 from collections import Counter, deque
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from twin.bridge.wire.keys import Attachment
-
-if TYPE_CHECKING:
-    from twin.bridge.node import Node
 
 _log = logging.getLogger("twin.bus")
 _MOST_REPORTS = 1000
@@ -23,8 +20,6 @@ class Receiver(Protocol):
 
     name: str
     """Of the topic or service."""
-    node: Node
-    """Whose it is."""
 
     def enqueue(self, data: Any, external: bool) -> None:
         """Put into the node's inbox."""

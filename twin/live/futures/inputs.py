@@ -69,6 +69,7 @@ class Inputs:
         run.run.bus.arrival_taps.append(self._take)
 
     def _take(self, arrival: Arrival) -> None:
+        receiver: Any
         receiver, data = arrival.receiver, arrival.data
         kind = next((kind for kind, cls in _CLASSES.items() if isinstance(receiver, cls)), None)
         if kind is None:
