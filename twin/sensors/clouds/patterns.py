@@ -116,7 +116,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
         ),
     }
 )
-"""By the name of Livox's file; fields of view are those of the data sheets."""
+"""By the name of Livox's file; fields of view are those that Livox gives."""
 
 
 def read_table(path: Path) -> Table:
