@@ -68,29 +68,27 @@ class Goods:
 
 def drawn(draw: np.random.Generator, distance: float) -> Iterator[Goods]:
     """Yield the boxes of one shelf whose front edge is so far away [m]."""
-    at = draw.uniform(-0.35, 0.0)
-    inset, yaw, turned = draw.uniform(0.03, 0.1), draw.uniform(-0.07, 0.07), 0.0
+    front, width = Pose2(0.0, 0.0, 0.0), 0.0
+    left = draw.uniform(-0.35, 0.0)
     for number in range(int(draw.integers(1, 5))):
-        touches = number > 0 and bool(draw.random() < 0.5)
-        if not touches:
-            at += draw.uniform(0.06, 0.25) if number else 0.0
-            inset, turned = draw.uniform(0.03, 0.1), math.radians(draw.uniform(-20.0, 20.0))
         make = int(draw.integers(3))
         # Totes and cartons have a label of one size, which has to fit.
         least = ((0.12, 0.1), (0.2, 0.12), (0.08, 0.05))[make]
         size = (draw.uniform(0.15, 0.4), draw.uniform(least[0], 0.4), draw.uniform(least[1], 0.26))
         rgba: Rgba = BOARD if draw.random() < 0.2 else (*draw.uniform(0.05, 0.95, 3).tolist(), 1.0)
-        angle = yaw if touches or draw.random() < 0.6 else turned
+        touches = number > 0 and bool(draw.random() < 0.5)
+        if touches:
+            front = front @ Pose2(0.0, (width + size[1]) / 2.0, 0.0)
+        else:
+            yaw = math.radians(draw.uniform(-20.0, 20.0) if draw.random() < 0.4 else draw.uniform(-4.0, 4.0))
+            half = size[1] / 2.0 * math.cos(yaw)
+            left += draw.uniform(0.06, 0.25) + size[0] * max(0.0, math.sin(yaw))
+            inset = draw.uniform(0.03, 0.1) + size[1] / 2.0 * abs(math.sin(yaw))
+            front = Pose2(distance + inset, left + half, yaw)
+        width = size[1]
         makes = tote_shapes(size, rgba), carton_shapes(size), (box(size, (0.0, 0.0, 0.0), rgba),)
-        made = makes[make]
-        half = size[1] / 2.0 * math.cos(angle) + size[0] * max(0.0, math.sin(angle))
-        yield Goods(
-            front=Pose2(distance + inset + size[1] / 2.0 * abs(math.sin(angle)), at + half, angle),
-            size=size,
-            shapes=made,
-            touches=touches,
-        )
-        at += 2.0 * half
+        yield Goods(front=front, size=size, shapes=makes[make], touches=touches)
+        left = float(Goods(front=front, size=size, shapes=(), touches=False).corners[:, 1].max())
 
 
 def is_in_sight(goods: Goods, others: list[Goods], edge: float, spread: float, up: float) -> bool:
@@ -106,7 +104,7 @@ def is_in_sight(goods: Goods, others: list[Goods], edge: float, spread: float, u
     (x0, y0), (x1, y1) = goods.corners[:2]
     if max(abs(y0 / x0), abs(y1 / x1)) > spread or goods.size[2] - EYE > up * min(x0, x1):
         return False
-    inner = goods.front.apply([(0.0, s * (goods.size[1] / 2.0 - 0.004)) for s in (-1, 1)])
+    inner = goods.front.apply([(0.0, s * (goods.size[1] / 2.0 - 0.004)) for s in np.linspace(-1.0, 1.0, 9)])
     solids = [_post(edge, y) for y in POSTS] + [other.corners for other in others if other is not goods]
     return not any(_hides(solid, point) for solid in solids for point in inner)
 

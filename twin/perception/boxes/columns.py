@@ -20,8 +20,8 @@ ON_SURFACE = 0.012
 _FOOT_ROWS = 6
 _LONGEST_HOLE = 3
 """Rows without a depth, or with a wrong one, that a face is followed across."""
-_COARSE = 0.03
-"""A top face whose rows are farther apart is seen too flatly to tell how far back it goes [m]."""
+COARSE = 0.03
+"""A face whose pixels are farther apart is seen too flatly to tell how far back it goes [m]."""
 
 
 def tolerance(x: Any) -> Any:
@@ -116,7 +116,13 @@ def _tops(view: LevelView, above: Array, at: Array, top: Index) -> tuple[Array, 
     exists = behind >= 0
     x_behind, above_behind = x[behind, column], above[behind, column]
     with np.errstate(invalid="ignore"):
-        is_flat = exists & (x_behind > at) & (np.abs(above_behind - front_height) < 0.015)
+        # The upper side of what is higher than the eye is not seen.
+        is_flat = (
+            exists
+            & (view.xyz[top, column, 2] < 0.0)
+            & (x_behind > at)
+            & (np.abs(above_behind - front_height) < 0.015)
+        )
         is_far = exists & (x_behind > at + tolerance(at))
         is_seen = is_flat | is_far | (~exists & (top > _LONGEST_HOLE))
     height, reach = front_height.copy(), np.full(len(at), np.nan)
@@ -130,7 +136,7 @@ def _tops(view: LevelView, above: Array, at: Array, top: Index) -> tuple[Array, 
             last = lid[-1]
             after = next_measured(x[:, u : u + 1], axis=0, step=-1)[last, 0]
             step = abs(x[last, u] - x[lid[-2], u])
-            if after >= 0 and x[after, u] > x[last, u] - tolerance(at[u]) and step < _COARSE:
+            if after >= 0 and x[after, u] > x[last, u] - tolerance(at[u]) and step < COARSE:
                 reach[u] = x[last, u] - at[u] + 0.5 * step
     return height, is_seen, reach
 
@@ -153,8 +159,11 @@ def next_measured(x: Array, *, axis: int, step: int) -> Index:
 
 def masked_median(values: Array, mask: Mask) -> Array:
     """Return the median of each column's masked values, nan where there are none, shape (width,)."""
-    count = mask.sum(axis=0)
-    ordered = np.sort(np.where(mask, values, np.inf), axis=0)
-    columns = np.arange(values.shape[1])
-    low, high = ordered[np.maximum(count - 1, 0) // 2, columns], ordered[count // 2 % len(ordered), columns]
-    return np.where(count > 0, (low + np.where(count % 2 == 0, high, low)) / 2.0, np.nan)
+    median = np.full(mask.shape[1], np.nan)
+    used, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
+    if len(used):
+        part = np.s_[rows[0] : rows[-1] + 1, used]
+        count, at = mask[part].sum(axis=0), np.arange(len(used))
+        ordered = np.sort(np.where(mask[part], values[part], np.inf), axis=0)
+        median[used] = (ordered[(count - 1) // 2, at] + ordered[count // 2, at]) / 2.0
+    return median

@@ -12,7 +12,7 @@ import numpy as np
 
 from twin.geometry import Pose2, Pose3, quat_wxyz_from_yaw, wrap_angle
 from twin.parameters import Interval, Metres, Positive
-from twin.perception.boxes.columns import Columns, next_measured, standing, tolerance
+from twin.perception.boxes.columns import COARSE, Columns, next_measured, standing, tolerance
 from twin.perception.boxes.picture import LevelView, Picture, level_view
 from twin.perception.boxes.surface import Surface, find_surface
 from twin.perception.boxes.walls import Wall, find_walls
@@ -217,6 +217,9 @@ def _depth(view: LevelView, columns: Columns, walls: list[Wall], number: int) ->
             continue
         other = walls[number + side]
         end = _edge(view, columns, walls, number + side, side)
+        step = other.meets(end.aside) - other.meets(end.aside - side * view.pixel)
+        if float(np.linalg.norm(step)) > COARSE:
+            continue
         if end.is_free and abs(corner - view.aside[other.columns[0 if side > 0 else -1]]) < 4.0 * view.pixel:
             return float(np.linalg.norm(other.meets(end.aside) - other.meets(corner)))
     return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,37 +63,60 @@ def level_view(picture: Picture) -> LevelView | None:
     height, width = _checked(picture)
     R_base_camera = matrix_from_quat_wxyz(picture.T_base_camera.quat_wxyz)
     ahead = R_base_camera[:, 2] * (1.0, 1.0, 0.0)
-    forward = float(np.linalg.norm(ahead))
-    if not forward > _LEAST_FORWARD or not np.isfinite(R_base_camera).all():
+    if not float(np.linalg.norm(ahead)) > _LEAST_FORWARD or not np.isfinite(picture.T_base_camera.xyz).all():
         return None
     yaw = float(np.arctan2(ahead[1], ahead[0]))
     T_base_view = Pose3.from_xyz_rpy(picture.T_base_camera.xyz, (0.0, 0.0, yaw))
-    R_view_camera = matrix_from_quat_wxyz(T_base_view.quat_wxyz).T @ R_base_camera
-    fx, fy, cx, cy = picture.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
-    aside, down = (np.arange(width) - cx) / fx, (np.arange(height) - cy) / fx
-    rays = np.stack(np.broadcast_arrays(1.0, -aside[None, :], -down[:, None]), axis=-1)
-    x, y, z = np.moveaxis(rays @ R_view_camera, -1, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        seen = np.stack((x / z, y / z), axis=-1).reshape(-1, 2)
-    seen[(z <= 0.0).ravel()] = np.nan
-    lens = Lens(width=width, height=height, horizontal_fov=1.0, distortion=picture.distortion)
-    at = np.rint(np.nan_to_num(lens.distorted(seen) * (fx, fy) + (cx, cy), nan=-1.0)).clip(-1, 1 << 20)
-    u, v = at.astype(np.intp).T
-    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
-    pixels = np.where(inside, v * width + u, 0)
-    depths = np.where(inside, picture.depth.ravel()[pixels].astype(np.float64), np.nan)
+    # A robot's joints tremble; a level view of a millionth of a radian less is as good, and there already.
+    R_view_camera = (matrix_from_quat_wxyz(T_base_view.quat_wxyz).T @ R_base_camera).round(6)
+    fx, fy, cx, cy = picture.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    turn = tuple(R_view_camera.ravel().tolist())
+    pixels, rays = _gathered(turn, (fx, fy, cx, cy), picture.distortion, (height, width))
+    depths = picture.depth.ravel()[pixels].astype(np.float64)
     depths[~(depths > 0.0) | ~np.isfinite(depths)] = np.nan
-    points = np.column_stack((np.nan_to_num(seen), np.ones(len(seen)))) * depths[:, None]
     colours = None
     if picture.colours is not None:
         colours = picture.colours.reshape(-1, 3)[pixels].astype(np.float64).reshape(height, width, 3)
     return LevelView(
-        xyz=(points @ R_view_camera.T).reshape(height, width, 3),
+        xyz=(rays * depths[:, None]).reshape(height, width, 3),
         colours=colours,
-        aside=aside,
-        down=down,
+        aside=(np.arange(width) - cx) / fx,
+        down=(np.arange(height) - cy) / fx,
         T_base_view=T_base_view,
     )
+
+
+@lru_cache(maxsize=8)
+def _gathered(
+    turn: tuple[float, ...],
+    lens: tuple[float, float, float, float],
+    distortion: tuple[float, float, float, float, float],
+    size: tuple[int, int],
+) -> tuple[NDArray[np.intp], Array]:
+    """Return which pixel is seen where, and what it shows at z = 1 in the level frame, nan: nothing.
+
+    Args:
+        turn: The level frame's rotation matrix of the camera, row by row.
+        lens: Focal lengths and centre, both ways [pixels].
+        distortion: Of the lens.
+        size: Height and width.
+    """
+    (height, width), (fx, fy, cx, cy) = size, lens
+    R_view_camera = np.array(turn).reshape(3, 3)
+    aside, down = (np.arange(width) - cx) / fx, (np.arange(height) - cy) / fx
+    level = np.stack(np.broadcast_arrays(1.0, -aside[None, :], -down[:, None]), axis=-1).reshape(-1, 3)
+    x, y, z = (level @ R_view_camera).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = np.stack((x / z, y / z), axis=-1)
+    seen[z <= 0.0] = np.nan
+    plain = Lens(width=width, height=height, horizontal_fov=1.0, distortion=distortion)
+    at = np.rint(np.nan_to_num(plain.distorted(seen) * (fx, fy) + (cx, cy), nan=-1.0))
+    inside = ((at >= 0.0) & (at <= (width - 1, height - 1))).all(axis=1)
+    at[~inside] = 0.0
+    u, v = at.astype(np.intp).T
+    rays = np.column_stack((seen, np.ones(len(seen)))) @ R_view_camera.T
+    rays[~inside] = np.nan
+    return v * width + u, rays
 
 
 def _checked(picture: Picture) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,8 @@ _FLAT = 0.35
 """... if it rises by less than this over the way between them."""
 _CELL, _LAYER = 0.025, 0.01
 """Flat points are counted by squares of this side, in layers of this height [m]."""
-_LEAST_CELLS = 20
+_LEAST_CELLS, _MOST = 20, 1000
+"""A surface has so many squares; none is farther away than so many [m / square]."""
 _STEEPEST = 0.15
 """Slope of what things still stand on."""
 _NEAR = (0.02, 0.012, 0.008)
@@ -51,19 +53,19 @@ def find_surface(xyz: Array, max_drop: float) -> Surface | None:
     points = xyz[flat]
     if len(points) < _LEAST_CELLS:
         return None
-    cells = np.floor(points / (_CELL, _CELL, _LAYER)).astype(np.int64)
-    layers, count = np.unique(np.unique(cells, axis=0)[:, 2], return_counts=True)
+    cells = np.floor(points / (_CELL, _CELL, _LAYER)).clip(-_MOST, _MOST - 1).astype(np.int64) + _MOST
+    once = np.unique((cells[:, 2] * 2 * _MOST + cells[:, 1]) * 2 * _MOST + cells[:, 0])
+    layers, count = np.unique(once // (4 * _MOST**2) - _MOST, return_counts=True)
     sums = np.zeros(int(layers[-1] - layers[0]) + 1)
     sums[layers - layers[0]] = count
     sums = np.convolve(sums, (1.0, 1.0, 1.0), mode="same")
     best = int(np.argmax(sums))
     if sums[best] < _LEAST_CELLS:
         return None
-    surface = Surface(slope=np.zeros(2), offset=(layers[0] + best + 0.5) * _LAYER)
+    surface: Surface | None = Surface(slope=np.zeros(2), offset=(layers[0] + best + 0.5) * _LAYER)
     for near in _NEAR:
-        surface = _fitted(points[np.abs(surface.above(points)) < near])
-        if surface is None or float(np.linalg.norm(surface.slope)) > _STEEPEST:
-            return None
+        if surface is not None:
+            surface = _fitted(points[np.abs(surface.above(points)) < near])
     return surface
 
 
@@ -82,4 +84,6 @@ def _fitted(points: Array) -> Surface | None:
         return None
     terms = np.column_stack((points[:, :2], np.ones(len(points))))
     solution, _, rank, _ = np.linalg.lstsq(terms, points[:, 2], rcond=1e-6)
-    return Surface(slope=solution[:2], offset=float(solution[2])) if rank == 3 else None
+    if rank < 3 or math.hypot(*solution[:2]) > _STEEPEST:
+        return None
+    return Surface(slope=np.array(solution[:2]), offset=float(solution[2]))

@@ -22,6 +22,8 @@ _SEAM = 0.85
 """... in more than this share of the rows: labels are not as high as what they are on."""
 _WINDOW = 3
 """Columns whose mean is a side's colour."""
+_NARROW = 0.06
+"""A narrower part at an end of a face is no thing [m]."""
 _STRIPE = 0.08
 """What is narrower, between two parts of one colour, is a tape across a thing [m]."""
 
@@ -184,4 +186,7 @@ def _without_tapes(
             kept = [*kept[:i], *kept[i + 2 :]]
         else:
             i += 1
-    return kept
+    # What is left of a thing behind an upright, or a part of a tape there.
+    narrow = _NARROW / metre
+    first, last = kept[1] - kept[0] < narrow, kept[-1] - kept[-2] < narrow
+    return [kept[0], *kept[1 + first : len(kept) - 1 - last], kept[-1]]
