@@ -20,7 +20,9 @@ ON_SURFACE = 0.012
 _FOOT_ROWS = 6
 _LONGEST_HOLE = 3
 """Rows without a depth, or with a wrong one, that a face is followed across."""
-COARSE = 0.03
+_BEHIND = 0.1
+"""What is farther behind the surface that is seen does not stand on it [m]."""
+COARSE = 0.05
 """A face whose pixels are farther apart is seen too flatly to tell how far back it goes [m]."""
 
 
@@ -90,7 +92,7 @@ def _foot(view: LevelView, surface: Surface, goods: Mask, above: Array) -> tuple
     # As far as two rows are from one another on the surface.
     spacing = 2.0 * x**2 * view.pixel / max(-surface.offset, 0.02)
     is_foot = goods & (before >= 0) & (np.abs(above_before) < ON_SURFACE)
-    is_foot &= x - x_before < 0.02 + spacing
+    is_foot &= (x - x_before < 0.02 + spacing) & (x < surface.reach + _BEHIND)
     is_foot[2:] &= goods[1:-1] & goods[:-2]
     last = x.shape[0] - 1 - np.argmax(is_foot[::-1], axis=0)
     return last, is_foot.any(axis=0)
@@ -124,7 +126,8 @@ def _tops(view: LevelView, above: Array, at: Array, top: Index) -> tuple[Array, 
             & (np.abs(above_behind - front_height) < 0.015)
         )
         is_far = exists & (x_behind > at + tolerance(at))
-        is_seen = is_flat | is_far | (~exists & (top > _LONGEST_HOLE))
+        sky = ~exists & (top > _LONGEST_HOLE) & view.inside[np.maximum(top - _LONGEST_HOLE, 0), column]
+        is_seen = is_flat | is_far | sky
     height, reach = front_height.copy(), np.full(len(at), np.nan)
     for u in np.flatnonzero(is_flat):
         rising = np.arange(top[u] - 1, -1, -1)
@@ -137,7 +140,7 @@ def _tops(view: LevelView, above: Array, at: Array, top: Index) -> tuple[Array, 
             after = next_measured(x[:, u : u + 1], axis=0, step=-1)[last, 0]
             step = abs(x[last, u] - x[lid[-2], u])
             if after >= 0 and x[after, u] > x[last, u] - tolerance(at[u]) and step < COARSE:
-                reach[u] = x[last, u] - at[u] + 0.5 * step
+                reach[u] = x[last, u] - at[u] + step * (1.5 if last - after > 1 else 0.5)
     return height, is_seen, reach
 
 

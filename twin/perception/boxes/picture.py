@@ -40,6 +40,8 @@ class LevelView:
 
     xyz: Array
     """Points [m], nan where there are none, shape (height, width, 3)."""
+    inside: NDArray[np.bool_]
+    """Which pixels the picture has, with a depth or without, shape (height, width)."""
     colours: Array | None
     """Shape (height, width, 3), from 0 to 255."""
     aside: Array
@@ -79,6 +81,7 @@ def level_view(picture: Picture) -> LevelView | None:
         colours = picture.colours.reshape(-1, 3)[pixels].astype(np.float64).reshape(height, width, 3)
     return LevelView(
         xyz=(rays * depths[:, None]).reshape(height, width, 3),
+        inside=np.isfinite(rays[:, 0]).reshape(height, width),
         colours=colours,
         aside=(np.arange(width) - cx) / fx,
         down=(np.arange(height) - cy) / fx,

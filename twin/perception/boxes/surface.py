@@ -32,6 +32,8 @@ class Surface:
     """Shape (2,)."""
     offset: float
     """[m]"""
+    reach: float
+    """How far ahead of the eye it is seen [m]."""
 
     def above(self, xyz: Array) -> Array:
         """Return how high points, shape (..., 3), are above it [m]."""
@@ -62,7 +64,8 @@ def find_surface(xyz: Array, max_drop: float) -> Surface | None:
     best = int(np.argmax(sums))
     if sums[best] < _LEAST_CELLS:
         return None
-    surface: Surface | None = Surface(slope=np.zeros(2), offset=(layers[0] + best + 0.5) * _LAYER)
+    height = (layers[0] + best + 0.5) * _LAYER
+    surface: Surface | None = Surface(slope=np.zeros(2), offset=height, reach=np.inf)
     for near in _NEAR:
         if surface is not None:
             surface = _fitted(points[np.abs(surface.above(points)) < near])
@@ -86,4 +89,5 @@ def _fitted(points: Array) -> Surface | None:
     solution, _, rank, _ = np.linalg.lstsq(terms, points[:, 2], rcond=1e-6)
     if rank < 3 or math.hypot(*solution[:2]) > _STEEPEST:
         return None
-    return Surface(slope=np.array(solution[:2]), offset=float(solution[2]))
+    reach = float(np.quantile(points[:, 0], 0.99))
+    return Surface(slope=np.array(solution[:2]), offset=float(solution[2]), reach=reach)
