@@ -226,6 +226,9 @@ def main() -> None:
     parser.add_argument("--near", type=float, default=0.45, help="to the shelf's edge, least [m]")
     parser.add_argument("--far", type=float, default=0.95, help="and most [m]")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--picture", type=Path, help="draw the last shelf, with what is found, into this file"
+    )
     options = parser.parse_args()
     detectors = {"depth": DepthBoxes(BoxesConfig()), "colours and depth": ColourDepthBoxes(BoxesConfig())}
     tallies = {(name, kind): Tally([]) for name in detectors for kind in ("alone", "touching")}
@@ -247,9 +250,32 @@ def main() -> None:
                 mine = [g for g in wanted if kinds[id(g)] == kind]
                 rest = [b for b in found if _kind_of(b, shelf, kinds) == kind]
                 tallies[name, kind].take(rest, shelf, mine)
+    if options.picture:
+        draw_picture(seen, list(detectors["colours and depth"].detect(seen)), options.picture)
     for (name, kind), tally in tallies.items():
         sys.stdout.write(f"{name}, {kind}: {tally.told()}\n")
     sys.stdout.write(f"on empty shelves: {empty}\n")
+
+
+def draw_picture(seen: Picture, boxes: list[Box], file: Path) -> None:
+    """Write the picture with a frame around each front: green, or red of what is not whole."""
+    from PIL import Image, ImageDraw
+
+    assert seen.colours is not None
+    height, width = seen.depth.shape
+    scale = 2
+    image = Image.fromarray(seen.colours).resize((scale * width, scale * height))
+    pen = ImageDraw.Draw(image)
+    for found in boxes:
+        y, z = found.width / 2.0, found.height / 2.0
+        corners = found.front.apply([(0, y, -z), (0, y, z), (0, -y, z), (0, -y, -z), (0, y, -z)])
+        at = seen.T_base_camera.inverse().apply(corners) @ seen.matrix.T
+        pixels = scale * (at[:, :2] / at[:, 2:]) + 0.5
+        colour = (20, 230, 60) if found.is_whole else (240, 30, 30)
+        pen.line([tuple(pixel) for pixel in pixels.tolist()], fill=colour, width=3)
+        size = f"{1e3 * found.width:.0f} x {1e3 * found.height:.0f}"
+        pen.text(tuple((pixels[1] + (6, 4)).tolist()), size, fill=(255, 255, 255), font_size=15)
+    image.save(file, quality=88)
 
 
 def _kind_of(found: Box, shelf: list[Goods], kinds: dict[int, str]) -> str:

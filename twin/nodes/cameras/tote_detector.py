@@ -113,12 +113,12 @@ def _picture(depth: Image, info: CameraInfo, image: Image | None, T_base_camera:
     """Return what messages tell; raises ValueError where they tell nothing."""
     z = messages.metres(depth)
     if z is None:
-        raise ValueError(f"no depths of encoding '{depth.encoding}'")
+        raise ValueError(f"no depths of encoding '{depth.encoding}', or cut off")
     colours = None
     if image is not None:
         colours = messages.pixels(image)
         if colours is None:
-            raise ValueError(f"no colours of encoding '{image.encoding}'")
+            raise ValueError(f"no colours of encoding '{image.encoding}', or cut off")
         colours = messages.rgb(colours, image.encoding)
     d = np.zeros(5)
     d[: min(5, len(info.d))] = info.d[:5]
