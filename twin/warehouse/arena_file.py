@@ -137,10 +137,13 @@ class ToteEntry(StrictModel):
     """0 is the leftmost, seen from the front."""
     colour: Colour = "red"
     depth: Length | None = None
-    """Of this one; absent: as `tote` has it. So are those that follow."""
+    """Of this one; absent: that of `tote`."""
     width: Length | None = None
+    """Likewise."""
     height: Length | None = None
+    """Likewise."""
     mass: Annotated[Kilograms, Field(gt=0.0)] | None = None
+    """Likewise."""
 
 
 class Stock(StrictModel):
