@@ -219,6 +219,21 @@ poses:
 """
 
 
+def test_a_tote_may_have_a_size_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "hall.yaml"
+    text = catalogue()["warehouse"].read_text(encoding="utf-8")
+    own = "slot: 7, colour: red, width: 16 cm, height: 0.12, mass: 1 kg}"
+    file.write_text(text.replace("slot: 7, colour: red}", own), encoding="utf-8")
+    arena = arenas.load(file)
+    one, other = arena.tote("tote_a"), arena.tote("tote_b")
+    assert (one.size, one.mass) == ((0.30, 0.16, 0.12), 1.0)
+    assert (other.size, other.mass) == ((0.30, 0.24, 0.18), 2.5)
+    assert one.T_map_tote.xyz[2] == pytest.approx(0.80 + 0.06)
+    file.write_text(text.replace("slot: 7, colour: red}", own.replace("16 cm", "70 cm")), encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"a tote is 0.7 m wide and a slot of rack 'rack_a' 0.6 m"):
+        arenas.load(file)
+
+
 def test_all_faults_of_a_file_are_reported_at_once_with_their_lines(tmp_path: Path) -> None:
     file = tmp_path / "faulty.yaml"
     file.write_text(FAULTY)

@@ -113,6 +113,8 @@ if TYPE_CHECKING:
     AprilTagDetectionArray: Any
     Detection2D: Any
     Detection2DArray: Any
+    Detection3D: Any
+    Detection3DArray: Any
     LabelInfo: Any
     ObjectHypothesisWithPose: Any
     VisionClass: Any
@@ -155,7 +157,10 @@ _NAMES = {
     "explore_lite_msgs": "ExploreStatus",
     "control_msgs": "GripperCommand JointTolerance JointTrajectoryControllerState",
     "apriltag_msgs": "AprilTagDetection AprilTagDetectionArray",
-    "vision_msgs": "Detection2D Detection2DArray LabelInfo ObjectHypothesisWithPose VisionClass",
+    "vision_msgs": (
+        "Detection2D Detection2DArray Detection3D Detection3DArray LabelInfo ObjectHypothesisWithPose "
+        "VisionClass"
+    ),
 }
 """Package -> its messages that are here."""
 _ALIASES = {"GripperCommand": "GripperCommandMsg"}

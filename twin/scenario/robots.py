@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from twin.scenario.apriltag import AprilTagParameters
     from twin.scenario.estimators.lidar_odometry import LidarOdometryParameters
     from twin.scenario.navigation import NavigationConfig
+    from twin.scenario.picture_detectors import PictureDetectorEntry
 else:  # most robots of small scenarios have none, and it is as much as all the rest
     NavigationConfig = later("twin.scenario.navigation:NavigationConfig")
     AprilTagParameters = later("twin.scenario.apriltag:AprilTagParameters")
     LidarOdometryParameters = later("twin.scenario.estimators.lidar_odometry:LidarOdometryParameters")
+    PictureDetectorEntry = later("twin.scenario.picture_detectors:PictureDetectorEntry")
 
 
 class RobotConfig(StrictModel):
@@ -56,7 +58,9 @@ class RobotConfig(StrictModel):
     apriltag: AprilTagParameters | None = None
     """What finds tags in the images of a camera; absent: nothing, `{}`: all defaults."""
     detector: DetectorEntry | None = None
-    """What finds the boxes that its gripper is to take; absent: `box_faces`."""
+    """What finds the boxes that its gripper is to take in the palm's scans; absent: `box_faces`."""
+    picture_detector: PictureDetectorEntry | None = None
+    """What finds them in [images of a camera](cameras.md#finding-totes) instead; absent: in scans."""
 
     @property
     def id(self) -> str:
@@ -76,5 +80,12 @@ class RobotConfig(StrictModel):
             yield Fault(("navigation",), "navigation needs a localisation of type odometry, amcl or slam")
         if self.apriltag is not None and self.cameras == "off":
             yield Fault(("apriltag",), "tags are found in images, but this robot's cameras are off")
+        if self.picture_detector is not None and self.cameras == "off":
+            yield Fault(("picture_detector",), "boxes are found in images, but this robot's cameras are off")
+        if self.picture_detector is not None and self.detector is not None:
+            yield Fault(
+                ("detector",),
+                "boxes are found in scans or in images: give either detector or picture_detector",
+            )
         if self.navigation is not None and self.base != "free":
             yield Fault(("base",), f"navigation needs the base 'free', not '{self.base}'")

@@ -174,7 +174,7 @@ class Arena:
     # -- from the file ---------------------------------------------------------------------------------------
 
     def _tote(self, name: str) -> Tote:
-        entry, kind = self.file.totes[name], self.file.tote
+        entry, kind = self.file.totes[name], self.file.kind_of(name)
         slot = self.racks[entry.rack].slot(entry.level, entry.slot)
         return Tote(
             name=name,

@@ -136,6 +136,14 @@ class ToteEntry(StrictModel):
     slot: int
     """0 is the leftmost, seen from the front."""
     colour: Colour = "red"
+    depth: Length | None = None
+    """Of this one; absent: that of `tote`."""
+    width: Length | None = None
+    """Likewise."""
+    height: Length | None = None
+    """Likewise."""
+    mass: Annotated[Kilograms, Field(gt=0.0)] | None = None
+    """Likewise."""
 
 
 class Stock(StrictModel):
@@ -185,6 +193,11 @@ class ArenaFile(StrictModel):
     zones: dict[str, ZoneEntry] = Field(default_factory=dict)
     poses: dict[str, PoseList] = Field(default_factory=dict)
 
+    def kind_of(self, name: str) -> ToteKind:
+        """Return size and mass of a tote that a mission can name."""
+        own = self.totes[name].model_dump(include={"depth", "width", "height", "mass"}, exclude_none=True)
+        return self.tote.model_copy(update=own)
+
     @model_validator(mode="after")
     def _consistent(self) -> ArenaFile:
         faults = [*_names(self), *_racks(self), *_totes(self), *_places(self), *_overlaps(self)]
@@ -215,19 +228,20 @@ def _names(arena: ArenaFile) -> Iterator[Fault]:
 
 
 def _racks(arena: ArenaFile) -> Iterator[Fault]:
-    tote = arena.tote
     for name, rack in arena.racks.items():
         levels = rack.levels
+        kinds = [arena.tote, *(arena.kind_of(own) for own, tote in arena.totes.items() if tote.rack == name)]
+        height, width = max(kind.height for kind in kinds), max(kind.width for kind in kinds)
         if any(low >= high for low, high in pairwise(levels)):
             yield Fault(("racks", name, "levels"), f"levels of rack '{name}' must rise, not {list(levels)}")
-        elif any(high - low < tote.height + 0.1 for low, high in pairwise(levels)):
-            text = f"levels of rack '{name}' must be {tote.height + 0.1:g} m apart or more to lift a tote out"
+        elif any(high - low < height + 0.1 for low, high in pairwise(levels)):
+            text = f"levels of rack '{name}' must be {height + 0.1:g} m apart or more to lift a tote out"
             yield Fault(("racks", name, "levels"), text)
-        if tote.width > rack.slot_spacing:
-            text = f"a tote is {tote.width:g} m wide and a slot of rack '{name}' {rack.slot_spacing:g} m; "
-            text += f"slot_spacing must be at least {tote.width:g}"
+        if width > rack.slot_spacing:
+            text = f"a tote is {width:g} m wide and a slot of rack '{name}' {rack.slot_spacing:g} m; "
+            text += f"slot_spacing must be at least {width:g}"
             yield Fault(("racks", name, "slot_spacing"), text)
-        if (depth := tote.inset + tote.depth) > rack.depth:
+        if (depth := max(kind.inset + kind.depth for kind in kinds)) > rack.depth:
             text = f"a tote needs {depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
             yield Fault(("racks", name, "depth"), text)
 

@@ -77,7 +77,7 @@ def structure(arena: Arena) -> Iterator[StaticBody]:
     for name, pillar in file.pillars.items():
         yield _block(name, Pose2(*pillar.pose), (*pillar.size, pillar.height), PALETTE["white"])
     for name, rack in file.racks.items():
-        yield _rack(name, rack)
+        yield rack_body(name, rack)
     for name, pallet in file.pallets.items():
         load, middle = pallet.load, (0.0, 0.0, _DECK + pallet.load / 2.0)
         yield _body(
@@ -165,7 +165,7 @@ def goods(
     frees: list[FreeBody] = []
     for tote in arena.totes.values():
         pose = tote.T_map_tote @ _placement_error(seed, tote.name, jitter)
-        shapes = _tote_shapes(tote.size, tote.rgba)
+        shapes = tote_shapes(tote.size, tote.rgba)
         if tote.name in free:
             held = {"mass": tote.mass, "friction": tote.friction}
             frees.append(FreeBody(name=tote.name, T_world_body=pose, shapes=shapes, **held))
@@ -186,10 +186,10 @@ def _stock(arena: Arena, seed: int, jitter: tuple[float, float]) -> Iterator[Sta
             index = int(look * (len(_STOCK) + 2))
             if index < len(_STOCK):
                 size = (kind.depth, kind.width, kind.height)
-                shapes = _tote_shapes(size, _STOCK[index])
+                shapes = tote_shapes(size, _STOCK[index])
             else:
                 size = _carton_size(rack, kind)
-                shapes = _carton_shapes(size)
+                shapes = carton_shapes(size)
             pose = slot.standing(size[0], size[2], kind.inset) @ _placement_error(seed, slot.name, jitter)
             yield StaticBody(name=f"stock/{slot.name}", T_world_body=pose, shapes=shapes)
 
@@ -262,7 +262,7 @@ def _cylinders(name: str, entry: CylindersEntry) -> StaticBody:
     return _body(name, _ORIGIN, *(Shape(geometry=upright, T_body_geometry=at, rgba=rgba) for at in places))
 
 
-def _rack(name: str, rack: RackEntry) -> StaticBody:
+def rack_body(name: str, rack: RackEntry) -> StaticBody:
     """Plinth up to the lowest level, a board for each other level, uprights, painted beams."""
     depth, length = rack.depth, rack.length
     lowest, top = rack.levels[0], rack.levels[-1] + rack.headroom
@@ -285,7 +285,7 @@ def _rack(name: str, rack: RackEntry) -> StaticBody:
     return _body(name, Pose2(*rack.pose), *shapes)
 
 
-def _tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, ...]:
+def tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, ...]:
     """One solid box, because a grasp needs nothing else; a dark opening, a rim and a label are paint."""
     depth, width, height = size
     light, dark = _mixed(rgba, 1.0, 0.35), _mixed(rgba, 0.0, 0.55)
@@ -298,7 +298,8 @@ def _tote_shapes(size: tuple[float, float, float], rgba: Rgba) -> tuple[Shape, .
     )
 
 
-def _carton_shapes(size: tuple[float, float, float]) -> tuple[Shape, ...]:
+def carton_shapes(size: tuple[float, float, float]) -> tuple[Shape, ...]:
+    """A box with a tape around it and a label."""
     depth, width, height = size
     p = 2.0 * _PAINT
     return (

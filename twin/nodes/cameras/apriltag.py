@@ -22,6 +22,7 @@ from twin.bridge.msgs import (
 )
 from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, transform_stamped
+from twin.nodes.cameras import messages
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Flat, Interval, Metres, NotNegative, Positive
 from twin.perception.tags.detector import TagDetector, TagDetectorConfig, TagSight
@@ -141,16 +142,11 @@ class AprilTagNode:
 
 def _grey(message: Image) -> NDArray[np.uint8] | None:
     """Return an image as grey values, shape (height, width); None if it is of another kind, or cut off."""
-    channels = 1 if message.encoding == "mono8" else 3 if message.encoding in _LUMA else 0
-    size = message.height, message.width
-    if not channels or not all(size) or message.step < message.width * channels:
+    pixels = messages.pixels(message)
+    if pixels is None or message.encoding == "mono8":
+        return pixels
+    if message.encoding not in _LUMA:
         return None
-    if len(message.data) < message.step * message.height:
-        return None
-    rows = np.asarray(message.data)[: message.step * message.height].reshape(message.height, message.step)
-    pixels = rows[:, : message.width * channels].reshape(*size, channels)
-    if channels == 1:
-        return np.ascontiguousarray(pixels[..., 0])
     return np.rint(pixels @ np.array(_LUMA[message.encoding], np.float32)).astype(np.uint8)
 
 

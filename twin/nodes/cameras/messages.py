@@ -24,6 +24,8 @@ _QUANT_A = _DEPTH_QUANTIZATION * (_DEPTH_QUANTIZATION + np.float32(1.0))
 _QUANT_B = np.float32(1.0) - _QUANT_A / _DEPTH_MAX
 _INVERSE_DEPTH = 0
 _XYZ = ("x", "y", "z")
+_PIXELS = {"mono8": ("u1", 1), "rgb8": ("u1", 3), "bgr8": ("u1", 3), "16UC1": ("u2", 1), "32FC1": ("f4", 1)}
+"""Type of a number, and how many are in a pixel."""
 
 
 def image(header: Header, pixels: NDArray[Any], encoding: str) -> Image:
@@ -38,6 +40,36 @@ def image(header: Header, pixels: NDArray[Any], encoding: str) -> Image:
         step=pixels[0].nbytes,
         data=_bytes(pixels),
     )
+
+
+def pixels(message: Image) -> NDArray[Any] | None:
+    """Return an image's numbers, shape (height, width) or (height, width, 3); None if it has none that fit.
+
+    It may be of another encoding, of size 0, or cut off.
+    """
+    kind, channels = _PIXELS.get(message.encoding, ("", 0))
+    size = message.height, message.width
+    if not channels or not all(size):
+        return None
+    number = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    wide = message.width * channels * number.itemsize
+    if message.step < wide or len(message.data) < message.step * message.height:
+        return None
+    rows = np.asarray(message.data)[: message.step * message.height].reshape(message.height, message.step)
+    numbers = np.ascontiguousarray(rows[:, :wide]).view(number)
+    return numbers.reshape(*size, channels) if channels > 1 else numbers
+
+
+def metres(message: Image) -> NDArray[np.float32] | None:
+    """Return depths [m], nan where there are none, shape (height, width); None if it is no such image."""
+    numbers = pixels(message)
+    if numbers is None or message.encoding not in ("32FC1", "16UC1"):
+        return None
+    z = numbers.astype(np.float32)
+    if message.encoding == "16UC1":
+        z[z == 0.0] = np.nan
+        z *= np.float32(1e-3)
+    return z
 
 
 def depth_image(header: Header, z: NDArray[np.float32], encoding: str) -> Image:

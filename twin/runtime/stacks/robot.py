@@ -177,10 +177,9 @@ class RobotStack:
         )
         if context.layout.autonomy != "all":
             return
-        from twin.nodes.tote_detector import ToteDetectorNode
+        from twin.runtime.stacks.tote_detector import build_tote_detector
 
-        detector = None if context.config.detector is None else context.config.detector.build()
-        ToteDetectorNode(bus, self.robot_pose, detector, namespace=context.namespace)
+        build_tote_detector(context, self.robot_pose)
 
 
 def _cameras(context: StackContext) -> list[CameraPublisher]:
