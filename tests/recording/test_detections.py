@@ -88,6 +88,27 @@ def test_boxes_lie_where_they_are_found(tmp_path: Path, make_world: Any, theta: 
     assert np.allclose(strip[0], strip[-1])
 
 
+def test_boxes_in_space_have_their_place_and_size(tmp_path: Path, make_world: Any) -> None:
+    kind = "vision_msgs/msg/Detection3DArray"
+    crate = new(types.get("vision_msgs/msg/Detection3D"))
+    crate.bbox.center.position.x, crate.bbox.center.position.z = 1.0, 0.5
+    crate.bbox.size.x, crate.bbox.size.y, crate.bbox.size.z = 0.2, 0.4, 0.6
+    world, sink = make_world(), RerunSink(tmp_path / "a.rrd")
+    sink.declare(world)
+    for world.time_ns, detections in ((100_000_000, [crate]), (200_000_000, [])):
+        told = message(kind, world.time_ns, "odom", *detections)
+        sink.on_sample(FakeSample("/crates", kind, world.time_ns, b"", told))  # type: ignore[arg-type]
+    sink.on_tick(world)
+    sink.close()
+    recording = read(tmp_path / "a.rrd")
+    centres, halves = (
+        recording.column("/ros/crates", f"Boxes3D:{name}") for name in ("centers", "half_sizes")
+    )
+    assert np.allclose(centres.values[0], [(1.0, 0.0, 0.5)])
+    assert np.allclose(halves.values[0], [(0.1, 0.2, 0.3)])
+    assert len(centres.values[1]) == 0
+
+
 def test_what_another_camera_sees_is_not_drawn_over_this_ones_pictures(
     tmp_path: Path, make_world: Any
 ) -> None:

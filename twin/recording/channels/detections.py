@@ -1,4 +1,4 @@
-"""What was found in pictures: outlines with their names, over the picture in which it was found."""
+"""What was found: outlines with their names over the picture in which it was found, boxes in space."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from twin.bridge.msgs import ns
 from twin.periods import next_due
-from twin.recording.channels.channel import Channel
+from twin.recording.channels.channel import Channel, Context
 from twin.recording.channels.pictures import image_frame, picture_entity
+from twin.recording.channels.spatial import SpatialChannel
 from twin.recording.columns import Chunk, Component, sim_time
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 _COLOUR = (60, 230, 90, 255)
 _STRIPS, _LABELS = (Component(rr.LineStrips2D, name) for name in ("strips", "labels"))
+_CENTRES, _TURNS, _HALF_SIZES = (
+    Component(rr.Boxes3D, name) for name in ("centers", "quaternions", "half_sizes")
+)
 
 
 class Found(NamedTuple):
@@ -101,3 +105,43 @@ class BoxChannel(DetectionChannel):
         likeliest = max(results, key=lambda result: result.hypothesis.score, default=None)
         kind = "" if likeliest is None else likeliest.hypothesis.class_id
         return np.add(turned, (at.x, at.y)), detection.id or kind
+
+
+class Solids(NamedTuple):
+    """What is shown of boxes in space."""
+
+    centres: NDArray[np.float32]
+    """Shape (n, 3) [m]."""
+    quats_xyzw: NDArray[np.float32]
+    """Shape (n, 4)."""
+    sizes: NDArray[np.float32]
+    """Shape (n, 3) [m]."""
+
+
+class SolidChannel(SpatialChannel[Solids]):
+    """vision_msgs/Detection3DArray as outlines of boxes."""
+
+    def __init__(self, context: Context, namespace: str, topic: str) -> None:
+        super().__init__(context, namespace, topic)
+        self.declare(rr.Boxes3D.from_fields(colors=[_COLOUR], radii=rr.Radius.ui_points(1.5)))
+
+    def take(self, sample: Sample[Any]) -> None:
+        """Keep the boxes."""
+        boxes = [each.bbox for each in sample.message.detections]
+        at = [(p.x, p.y, p.z) for p in (box.center.position for box in boxes)]
+        turns = [(q.x, q.y, q.z, q.w) for q in (box.center.orientation for box in boxes)]
+        sizes = [(box.size.x, box.size.y, box.size.z) for box in boxes]
+        columns = zip((at, turns, sizes), (3, 4, 3), strict=True)
+        self.put(sample, Solids(*(np.array(rows, np.float32).reshape(-1, n) for rows, n in columns)))
+
+    def draw(self, rows: list[tuple[int, Solids]]) -> Iterator[Chunk]:
+        """Yield the boxes."""
+        times, found = zip(*rows, strict=True)
+        lengths = [len(each.centres) for each in found]
+        centres, turns, sizes = (np.concatenate(rows) for rows in zip(*found, strict=True))
+        columns = (
+            _CENTRES.column(centres, lengths),
+            _TURNS.column(turns, lengths),
+            _HALF_SIZES.column(sizes / 2.0, lengths),
+        )
+        yield self.entity, sim_time(times), columns

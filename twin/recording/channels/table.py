@@ -7,7 +7,7 @@ from typing import Any
 from twin.recording.channels.belief import BeliefChannel
 from twin.recording.channels.channel import Channel, Context
 from twin.recording.channels.clouds import CloudChannel
-from twin.recording.channels.detections import BoxChannel, TagChannel
+from twin.recording.channels.detections import BoxChannel, SolidChannel, TagChannel
 from twin.recording.channels.images import DepthChannel
 from twin.recording.channels.pictures import PictureChannel
 from twin.recording.channels.series import (
@@ -41,6 +41,7 @@ _BY_TYPE: dict[str, type[Any]] = {
     "sensor_msgs/msg/Image": DepthChannel,
     "apriltag_msgs/msg/AprilTagDetectionArray": TagChannel,
     "vision_msgs/msg/Detection2DArray": BoxChannel,
+    "vision_msgs/msg/Detection3DArray": SolidChannel,
 }
 _BY_NAME: dict[tuple[str, str], type[Any]] = {
     ("cmd_vel", "geometry_msgs/msg/Twist"): VelocityChannel,
