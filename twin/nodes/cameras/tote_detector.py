@@ -120,13 +120,12 @@ def _picture(depth: Image, info: CameraInfo, image: Image | None, T_base_camera:
         if colours is None:
             raise ValueError(f"no colours of encoding '{image.encoding}', or cut off")
         colours = messages.rgb(colours, image.encoding)
-    d = np.zeros(5)
-    d[: min(5, len(info.d))] = info.d[:5]
+    k1, k2, p1, p2, k3 = (*np.asarray(info.d).tolist(), *[0.0] * 5)[:5]
     return Picture(
         depth=z,
         colours=colours,
         matrix=np.asarray(info.k).reshape(3, 3),
-        distortion=tuple(d.tolist()),
+        distortion=(k1, k2, p1, p2, k3),
         T_base_camera=T_base_camera,
     )
 

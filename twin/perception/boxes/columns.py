@@ -95,7 +95,7 @@ def _foot(view: LevelView, surface: Surface, goods: Mask, above: Array) -> tuple
     is_foot &= (x - x_before < 0.02 + spacing) & (x < surface.reach + _BEHIND)
     is_foot[2:] &= goods[1:-1] & goods[:-2]
     last = x.shape[0] - 1 - np.argmax(is_foot[::-1], axis=0)
-    return last, is_foot.any(axis=0)
+    return last, np.asarray(is_foot.any(axis=0))
 
 
 def _followed(face: Mask, foot: Index) -> tuple[Mask, Index]:
@@ -139,7 +139,9 @@ def _tops(view: LevelView, above: Array, at: Array, top: Index) -> tuple[Array, 
             last = lid[-1]
             after = next_measured(x[:, u : u + 1], axis=0, step=-1)[last, 0]
             step = abs(x[last, u] - x[lid[-2], u])
-            if after >= 0 and x[after, u] > x[last, u] - tolerance(at[u]) and step < COARSE:
+            ends = after >= 0 and x[after, u] > x[last, u] + 2.0 * step
+            # A rim is no top.
+            if ends and step < COARSE and x[last, u] > at[u] + tolerance(at[u]):
                 reach[u] = x[last, u] - at[u] + step * (1.5 if last - after > 1 else 0.5)
     return height, is_seen, reach
 

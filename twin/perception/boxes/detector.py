@@ -21,8 +21,12 @@ _MAX_YAW = math.radians(45.0)
 """A face that is turned away farther than this is a side."""
 _ASIDE = 0.04
 """What is beside a face is looked at for so far [m]."""
+_SHADOW = 3.5
+"""More pixels without depth are not those of an edge alone."""
 _CORNER = math.radians(12.0)
 """How far the angle between front and side may be off a right one."""
+_LEAST_COLUMNS = 8
+"""A side that is seen in fewer does not tell how far back a box goes."""
 _PARTLY = 0.5
 """Score of what is not wholly in sight, of 1."""
 
@@ -177,8 +181,8 @@ def _edge(view: LevelView, columns: Columns, walls: list[Wall], number: int, sid
     beyond = next_measured(x[rows], axis=1, step=side)[:, column]
     rows, beyond, of_all = rows[beyond >= 0], beyond[beyond >= 0], len(rows)
     # A stereo camera has no depth where the shift jumps: of two pixels at an edge, one is the face's.
-    is_hole = len(rows) > 0 and float(np.median(np.abs(beyond - column))) > 1.5
-    aside = float(view.aside[column]) + side * view.pixel * (1.5 if is_hole else 0.5)
+    gap = float(np.median(np.abs(beyond - column))) if len(rows) else 0.0
+    aside = float(view.aside[column]) + side * view.pixel * (1.5 if gap > 1.5 else 0.5)
     at = float(wall.meets(aside)[0])
     if 2 * len(rows) < of_all or not at > 0.0:
         return _Edge(aside=aside, is_seen=False)
@@ -186,7 +190,10 @@ def _edge(view: LevelView, columns: Columns, walls: list[Wall], number: int, sid
     if corner is not None and abs(corner - aside) < 4.0 * view.pixel:
         aside = corner
     off = tolerance(at)
-    is_free = bool(np.median(x[rows, beyond] - at) > off)
+    goes_on = wall.offset / np.maximum(wall.normal[0] - wall.normal[1] * view.aside[beyond], 1e-6)
+    # What is near casts a shadow to its left, in which the other view sees nothing: a face that ends at one
+    # ends there.
+    is_free = bool(np.median(x[rows, beyond] - goes_on) > off) or (side < 0 and gap > _SHADOW)
     # What hides it may show its own side first.
     ways = side * np.arange(int(_ASIDE / (view.pixel * at)) + 1)
     nearby = x[rows[:, None], np.clip(beyond[:, None] + ways, 0, x.shape[1] - 1)]
@@ -213,9 +220,9 @@ def _depth(view: LevelView, columns: Columns, walls: list[Wall], number: int) ->
         return float(np.nanmedian(reach) * wall.normal[0])
     for side in (-1, 1):
         corner = _corner(walls, number, side)
-        if corner is None:
+        other = walls[number + side] if corner is not None else wall
+        if corner is None or len(other.columns) < _LEAST_COLUMNS:
             continue
-        other = walls[number + side]
         end = _edge(view, columns, walls, number + side, side)
         step = other.meets(end.aside) - other.meets(end.aside - side * view.pixel)
         if float(np.linalg.norm(step)) > COARSE:
