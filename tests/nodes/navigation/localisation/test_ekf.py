@@ -236,7 +236,7 @@ def test_the_first_odometry_is_that_of_the_wheels(bench: Bench) -> None:
         now = header(bench.clock.now_ns, "base_footprint")
         for publisher, speed in zip(publishers, (0.0, 0.01), strict=True):
             twist = TwistWithCovariance(twist=twist_from_planar(speed, 0.0), covariance=np.eye(6).ravel())
-            publisher.publish(Odometry(header=now, child_frame_id="base_footprint", twist=twist))
+            publisher.publish(new(Odometry, header=now, child_frame_id="base_footprint", twist=twist))
         imu.publish(new(Imu, header=now, angular_velocity=Vector3(0.0, 0.0, 0.004)))
         bench.run(0.02)
     assert ekf.biases[-2].value[2] == pytest.approx(0.004, abs=1e-4)
