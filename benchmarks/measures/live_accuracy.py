@@ -184,9 +184,11 @@ def drive(cable: Cable, seconds: float) -> tuple[Watched, int, float]:
             print(f"  told: {event.what}: {event.text}")
         cut_ns, cut_s = mirror.clock.now_ns, watched.world.time_ns * 1e-9
         cable.whole.clear()
+        offsets, watched.offsets = watched.offsets, []  # what waits in a cut cable is late on one way
         watched.until(cut_s + CUT_S)
         cable.whole.set()
         watched.until(cut_s + CUT_S + AFTER_S)
+        watched.offsets = offsets
         return watched, cut_ns, cut_s
 
 
