@@ -57,6 +57,9 @@ NOT_RUN = {
     r"cd my_robot && (twin test .*|python -m pytest)": "tests/test_wheel.py does that, with the wheel",
     r"twin test scenarios -j 2 --out runs/all": "tests/runtime/test_shipped_scenarios.py does that",
     r"twin report runs/all": "tests/runtime/test_shipped_scenarios.py does that",
+    r"twin run scenarios/warehouse\.yaml --set robots\.0\.args\.palm_camera=\S+ .*": (
+        "takes most of a minute: tests/runtime/test_tote_cameras.py does that"
+    ),
     r"twin run scenarios/warehouse_(lidar_lost|kidnapped|slam)\.yaml .*": "so do all that ship, there",
     r"source \.venv/bin/activate": "the tests run in an environment already",
     r"twin play .* --screenshot .*": "needs a Vulkan driver: tests/recording/test_player.py does that",
