@@ -68,7 +68,7 @@ class FakeRuntime:
         self.calls.append({"scenario": scenario, **options})
         return self
 
-    def advance_to_end(self, progress: object) -> None:
+    def advance_to_end(self, progress: object, watch: object = None) -> None:
         if self.fault is not None:
             raise self.fault
 

@@ -131,7 +131,7 @@ class Run:
     def __init__(self, scenario, **options):
         self.name = scenario.name
 
-    def advance_to_end(self, progress):
+    def advance_to_end(self, progress, watch=None):
         signal.raise_signal(number)
 
     def finish(self):
