@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -43,7 +44,9 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield f"http://127.0.0.1:{port}/"
         process.send_signal(signal.SIGINT)
     assert process.returncode == 0
-    assert not (folder / "runs/rosbridge.jsonl").exists(), "nobody commanded"
+    audit = (folder / "runs/rosbridge.jsonl").read_text("utf-8").splitlines()
+    targets = {json.loads(line)["target"].rpartition("/")[0] for line in audit}
+    assert targets == {"/rosbag2_player"}, "nobody commanded a robot"
 
 
 def slide(page: Any, seconds: float) -> None:
