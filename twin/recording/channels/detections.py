@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -59,9 +60,9 @@ class DetectionChannel(Channel[Found]):
             if frame == message.header.frame_id and self.context.frames.split(topic)[0] == self.namespace:
                 self.rows.append(Found(sample.time_ns, topic, outlines, names))
 
+    @abstractmethod
     def outline(self, detection: Any) -> tuple[NDArray[np.float64], str]:
         """Return corners of what was found, shape (n, 2) [pixels], and what it is called."""
-        raise NotImplementedError
 
     def chunks(self, rows: list[Found]) -> Iterator[Chunk]:
         """Yield the outlines, camera by camera."""
