@@ -12,7 +12,8 @@ from twin.bridge.msgs import Clock as ClockMsg
 from twin.bridge.msgs import String, Twist, stamp
 from twin.bridge.node.options import BARE
 from twin.bridge.qos import LATCHED
-from twin.bridge.srvs import AddTwoInts
+from twin.bridge.services import Respond
+from twin.bridge.srvs import AddTwoInts, Trigger
 from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.errors import BridgeError
 
@@ -120,3 +121,23 @@ def test_any_topic_as_bytes(endpoint: str) -> None:
             ("/chatter", "std_msgs/msg/String", b"hi\0"),
         ]
         assert got[1].source.gid == chatter.gid
+
+
+def test_a_server_may_take_as_long_as_the_client_says(endpoint: str) -> None:
+    with live.join(listen=[endpoint]) as there, live.join([endpoint]) as here:
+        asked: list[Respond] = []
+        server = there.bus.create_node("server")
+        server.create_deferred_service(Trigger, "go", lambda _, respond: asked.append(respond))
+        node = here.bus.create_node("client")
+        hasty, patient = (node.create_client(Trigger, "go", **given) for given in ({"timeout_s": 0.2}, {}))
+        assert here.spin(until=lambda: hasty.service_is_ready and patient.service_is_ready, timeout_s=100)
+        given_up, waited = hasty.call_async(Trigger.Request()), patient.call_async(Trigger.Request())
+        assert there.spin(until=lambda: len(asked) == 2, timeout_s=100)
+        assert here.spin(until=lambda: given_up.done, timeout_s=100)
+        assert given_up.error == "nobody answered on the service /go; is its node running?"
+        assert not waited.done
+        for respond in asked:
+            respond(Trigger.Response(True, ""))
+        there.spin_once(0.0)
+        assert here.spin(until=lambda: waited.done, timeout_s=100)
+        assert waited.result.success

@@ -16,7 +16,7 @@ from twin.bridge.node.tasks import NEVER_NS, Execution, Steps, Task
 from twin.bridge.node.timers import Rate, Timer
 from twin.bridge.parameters.node_parameters import NodeParameters
 from twin.bridge.qos import PARAMETER_EVENTS, QoS, as_qos
-from twin.bridge.services import Client, Respond, Service
+from twin.bridge.services import FOREVER_S, Client, Respond, Service
 from twin.bridge.topics import Endpoint, Publisher, Subscription
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.keys import NodeToken
@@ -216,13 +216,18 @@ class Node(NodeParameters, NodeGraph):
         """
         return self.add_endpoint(Service(self, srv_type, self.resolve_name(name), callback))
 
-    def create_client(self, srv_type: ServiceType, name: str) -> Client:
+    def create_client(self, srv_type: ServiceType, name: str, *, timeout_s: float = FOREVER_S) -> Client:
         """Return a client of a service.
+
+        Args:
+            timeout_s: How long [s] of wall time a server of another process may take; then the future ends with
+                an error. Zenoh keeps a kilobyte of a request for so long, even of one that has been
+                answered: who asks again and again, for days, gives a short one.
 
         Raises:
             BridgeError: an invalid name.
         """
-        return self.add_endpoint(Client(self, srv_type, self.resolve_name(name)))
+        return self.add_endpoint(Client(self, srv_type, self.resolve_name(name), timeout_s))
 
     def destroy_publisher(self, publisher: Publisher[Any]) -> bool:
         """Leave a topic; return whether it was this node's."""

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["Client", "Future", "Respond", "Service"]
 
 _QOS = QoS(depth=10)
-_FOREVER_S = 1e8  # like rmw_zenoh, a request has no time-out of its own
+FOREVER_S = 1e8
+"""As in rmw_zenoh, a request has no time-out of its own."""
 
 Respond = Callable[[Any], None]
 """Sends the response, or None: who asked learns that there is none. May be called in a later spin."""
@@ -138,7 +139,9 @@ class Service(Endpoint):
 class Client(Endpoint):
     """Asks a service; the response arrives in the node's spin."""
 
-    def __init__(self, node: Node, srv_type: ServiceType, name: str) -> None:
+    def __init__(
+        self, node: Node, srv_type: ServiceType, name: str, timeout_s: float = FOREVER_S
+    ) -> None:
         super().__init__(node, "SC", name, srv_type.name, _QOS)
         self._requests, self._responses = codecs(srv_type)
         self._sequence = 0
@@ -155,7 +158,7 @@ class Client(Endpoint):
                 # The bridge's queryables do not say that they are complete.
                 target=zenoh.QueryTarget.BEST_MATCHING if self._bridged else zenoh.QueryTarget.ALL_COMPLETE,
                 consolidation=zenoh.ConsolidationMode.NONE,
-                timeout=_FOREVER_S,
+                timeout=timeout_s,
             )
         )
         self._declared.append(self._querier)

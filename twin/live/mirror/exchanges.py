@@ -12,6 +12,7 @@ from twin.bridge.srvs import GetParameters
 from twin.live.mirror.clock_offset import ClockOffset, Offset
 
 _PERIOD_NS = 100_000_000
+_TIMEOUT_S = 10.0
 _DEPTH = 100
 """So many answers may wait, and so many questions may be open."""
 
@@ -67,7 +68,7 @@ class ClockExchanges:
             if self._client is not None:
                 self.node.destroy_client(self._client)
                 self._open.clear()
-            self._client = self.node.create_client(GetParameters, service)
+            self._client = self.node.create_client(GetParameters, service, timeout_s=_TIMEOUT_S)
             self._client.timed = lambda *exchange: self._answers.append(exchange)
         if self._client.service_is_ready:
             self._asked_ns = now_ns

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 APPEAR_S = 2.0
 """How long a service or an action that nobody offers is waited for [s]."""
+LONGEST_S = 600.0
+"""How long a service may take to answer a client [s]."""
 _MOST_CLIENTS = 200
 _MOST_WAITING = 1000
 """Requests to a service of a client that it has not answered; the oldest is told that nobody will."""
@@ -196,7 +198,9 @@ class Calls:
             idle = [old for old, client in self._clients.items() if id(client) not in busy]
             if len(self._clients) >= _MOST_CLIENTS and idle:
                 self._node.destroy_client(self._clients.pop(idle[0]))
-            self._clients[key] = self._node.create_client(types.ServiceType(typename), name)
+            self._clients[key] = self._node.create_client(
+                types.ServiceType(typename), name, timeout_s=LONGEST_S
+            )
         return self._clients[key]
 
     def _on_response(self, call: _Call, future: Future) -> None:
