@@ -217,7 +217,7 @@ def report(
     print(f"the robot drove {driven:.0f} m")
     tick_s = watched.mirror.run.run.parts.control_period_ns * 1e-9
     far, turned = (max(each) / tick_s for each in zip(*watched.corrections, strict=True))
-    print(f"corrections: at most {far:.3f} m/s, {turned:.3f} rad/s")
+    print(f"corrections: at most {far:.3f} m/s, {turned:.3f} rad/s, by a clock that may be slewed by 1 %")
     began_s = watched.offsets[0][0]
     for first_s, last_s in ((0.0, 30.0), (30.0, math.inf)):
         off = [

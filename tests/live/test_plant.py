@@ -86,6 +86,7 @@ def test_a_perturbed_wheel_drives_another_way_than_odometry_believes(tmp_path: P
     with (tmp_path / "truth.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert {row["robot"] for row in rows} == {"diff_bot"}
+    assert int(rows[0]["stamp_ns"]) == START_NS, "the first odometry is of then"
     assert int(rows[-1]["stamp_ns"]) == START_NS + 3_000_000_000
     assert float(rows[-1]["x"]) == pytest.approx(0.9 * believed, rel=0.02)
 

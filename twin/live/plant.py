@@ -60,7 +60,7 @@ class Plant:
         """
         changes: dict[str, object] = {"checks": (), "early_stop": "never", "duration": _FOR_EVER_S}
         scenario = scenario.model_copy(update=changes)
-        self._starts_now = start_ns is None
+        self._starts_now, self._has_begun = start_ns is None, False
         self._pace = None if pace is None else Pace(pace, slack_s=_SLACK_S)
         self.clock = DeviceClock(time.time_ns() if start_ns is None else start_ns, error)
         with ExitStack() as ending:
@@ -86,11 +86,13 @@ class Plant:
 
     def advance(self, until: Callable[[], bool] = lambda: False) -> None:
         """Go on until a condition holds after a tick; raises TwinError if the robots cannot go on."""
-        if self._starts_now:
-            self._starts_now = False
-            self.clock.start(time.time_ns())
-            if self._pace is not None:
-                self._pace.start()
+        if not self._has_begun:
+            self._has_begun = True
+            if self._starts_now:
+                self.clock.start(time.time_ns())
+                if self._pace is not None:
+                    self._pace.start()
+            self._tell_truth()
         self.run.advance(lambda: self._tell_truth() or until())
 
     @property

@@ -72,7 +72,8 @@ class PlantSource(Source):
         self._heard = deque((0, sample) for _, sample in self._heard if sample.topic == "/tf_static")
 
     def reading(self, robot: str) -> ClockReading:
-        return ClockReading(offset_s=0.0, bound_s=0.0)
+        period_s = self.plant.run.run.parts.control_period_ns * 1e-9
+        return ClockReading(offset_s=0.0, bound_s=(_LATE_TICKS - 1) * period_s)
 
     def after_tick(self) -> tuple[()]:
         self._ticks += 1

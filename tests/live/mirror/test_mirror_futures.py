@@ -77,9 +77,11 @@ class Driven:
             self.odometry_off = robot.odometry.inverse() @ truly
             self.answer = both.answer(n=2, horizon=20.0) if asks else None
             self.truth: dict[int, Pose2] = {}
+            self.virtual: dict[int, Pose2] = {}
 
             def note() -> bool:
-                self.truth[round((both.now_s - at_s) * 1e3)] = both.pose(both.plant.run)
+                now = round((both.now_s - at_s) * 1e3)
+                self.truth[now], self.virtual[now] = both.pose(both.plant.run), both.pose(both.run)
                 return not goal.is_active
 
             both.mirror.advance(note)
@@ -112,6 +114,17 @@ def test_what_they_tell_is_what_the_physical_robot_does(asked_once: Driven) -> N
     agrees(asked_once)
     assert asked_once.answer is not None
     assert asked_once.arrival_s > 3.0, "it must have been on its way"
+
+
+def test_commands_reach_the_virtual_robot_when_they_reach_the_physical_one(asked_once: Driven) -> None:
+    steps = sorted(time for time in asked_once.truth if time > 1000)
+
+    def apart(late_ticks: int) -> float:
+        pairs = zip(steps[: len(steps) - late_ticks], steps[late_ticks:], strict=True)
+        return max(abs(asked_once.truth[a].yaw - asked_once.virtual[b].yaw) for a, b in pairs)
+
+    assert math.degrees(apart(0)) < 0.2
+    assert apart(0) < apart(1), "the virtual one is not behind"
 
 
 def test_the_mirror_says_the_same_whether_it_is_asked_or_not(asked_once: Driven, tmp_path: Path) -> None:

@@ -220,8 +220,10 @@ class Node(NodeParameters, NodeGraph):
         """Return a client of a service.
 
         Args:
-            timeout_s: How long [s] of wall time a server of another process may take; then the future ends with
-                an error. Zenoh keeps a kilobyte of a request for so long, even of one that has been
+            srv_type: What is asked and answered.
+            name: Of the service.
+            timeout_s: How long [s] of wall time a server of another process may take; then the future ends
+                with an error. Zenoh keeps a kilobyte of a request for so long, even of one that has been
                 answered: who asks again and again, for days, gives a short one.
 
         Raises:

@@ -139,9 +139,7 @@ class Service(Endpoint):
 class Client(Endpoint):
     """Asks a service; the response arrives in the node's spin."""
 
-    def __init__(
-        self, node: Node, srv_type: ServiceType, name: str, timeout_s: float = FOREVER_S
-    ) -> None:
+    def __init__(self, node: Node, srv_type: ServiceType, name: str, timeout_s: float = FOREVER_S) -> None:
         super().__init__(node, "SC", name, srv_type.name, _QOS)
         self._requests, self._responses = codecs(srv_type)
         self._sequence = 0

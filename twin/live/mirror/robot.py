@@ -25,6 +25,7 @@ from twin.live.mirror.relocalising import Relocalising
 from twin.live.mirror.source import ClockChange, Source
 from twin.live.mirror.status import Status
 from twin.live.mirror.told import Told
+from twin.live.mirror.underway import Underway
 from twin.nodes.guard.verdict import Verdict
 from twin.nodes.messages import pose_stamped
 from twin.runtime.stacks.robot import RobotStack
@@ -123,7 +124,9 @@ class MirroredRobot:
         self._commands = node.create_subscription(
             Twist, f"{space}/cmd_vel", self._on_command, 10, frozen=True
         )
-        self._relayed = node.create_publisher(Twist, "cmd_vel", 10)
+        relayed = node.create_publisher(Twist, "cmd_vel", 10)
+        self._tick_s = context.control_period_ns * 1e-9
+        self._underway = Underway[Twist](lambda message: relayed.publish(message, frozen=True))
         self.guard: GuardClient | None = None
         if guard is not None:
             self.guard = GuardClient(node, guard=f"{space}/{guard}")
@@ -139,7 +142,9 @@ class MirroredRobot:
         """Return how it is mirrored at a time of the robot's clock [ns]."""
         difference, heard_ns = self.difference, self.heard_ns
         clock = source.reading(self.stack.name)
-        self.divergence.monitor.clock_bound_s = clock.bound_s or 0.0
+        self.divergence.monitor.clock_bound_s = bound_s = clock.bound_s or 0.0
+        # The virtual robot's drive hears in the next tick what is relayed in this one.
+        self._underway.takes_s = max(0.0, bound_s - self._tick_s)
         acknowledged, commands = self._obeyed() if source.is_live else (False, "a bag obeys no commands")
         guarded = self.guard.status if self.guard is not None and self.guard.is_present else None
         evidence = Evidence(
@@ -179,6 +184,7 @@ class MirroredRobot:
             by_ns = change.set_by_ns if change.robot is None else 0  # of several robots none has our clock
             self.follower.forget()
             self.obedience.forget()
+            self._underway.forget()
             self.divergence.clock_set(by_ns)
             self._pending.clear()
             self._latest_ns = -1
@@ -195,6 +201,7 @@ class MirroredRobot:
 
     def _step(self) -> None:
         now_ns, world, base = self.node.now_ns, self._world, self.stack.handle.base
+        self._underway.update(now_ns)
         virtual = world.pose(base).to_pose2()
         self.follower.note(now_ns, virtual)
         self._driven = self.follower.correction.inverse() @ virtual
@@ -323,11 +330,12 @@ class MirroredRobot:
         return True, f"acknowledged by the guard, the latest in {1e3 * trip_s:.0f} ms"
 
     def _on_command(self, message: Twist) -> None:
+        now_ns, source = self.node.now_ns, self._commands.source
+        is_own = source is not None and source.gid in self._own_commands
+        if is_own:
+            self.obedience.command(now_ns, message.linear.x, message.angular.z)
         if self._flows():
-            self._relayed.publish(message, frozen=True)
-        source = self._commands.source
-        if source is not None and source.gid in self._own_commands:
-            self.obedience.command(self.node.now_ns, message.linear.x, message.angular.z)
+            self._underway.send(now_ns, message)
 
     def _flows(self) -> bool:
         """Return whether commands reach the physical robot, as far as can be told: it is heard.

@@ -48,7 +48,8 @@ class Errands:
             try:
                 key = (name, typename)
                 if key not in self._clients:
-                    self._clients[key] = self._node.create_client(ServiceType(typename), name, timeout_s=_CALL_S)
+                    kind = ServiceType(typename)
+                    self._clients[key] = self._node.create_client(kind, name, timeout_s=_CALL_S)
                 self._clients[key].call_async(request).add_done_callback(end)
             except BridgeError as fault:
                 done.set_exception(fault)
