@@ -44,22 +44,40 @@ Frames = list[tuple[float, str | bytes]]
 
 
 def clients(address: str, topics: list[str], keep: Event, over: Event, out: Any) -> None:
-    """Be so many clients, who hear all topics and read all that comes; give what one heard while it keeps."""
-    from websockets.asyncio.client import connect
+    """Be so many clients, who hear all topics and read all that comes; give what one heard while it keeps.
 
-    kept: Frames = []
+    They do no more than a client must, so that most of this computer is left for what is measured.
+    """
+    from websockets.client import ClientProtocol
+    from websockets.frames import Frame, Opcode
+    from websockets.uri import parse_uri
+
+    uri, kept = parse_uri(address), Frames()
 
     async def one(number: int) -> None:
-        async with connect(address, max_size=None, compression=None) as client:
-            for topic in topics:
-                await client.send(json.dumps({"op": "subscribe", "topic": topic}))
-            while not over.is_set():
-                try:
-                    frame = await asyncio.wait_for(client.recv(), 0.5)
-                except TimeoutError:
-                    continue
-                if number == 0 and keep.is_set():
-                    kept.append((time.perf_counter(), frame))
+        protocol = ClientProtocol(uri, max_size=None)
+        reader, writer = await asyncio.open_connection(uri.host, uri.port)
+        protocol.send_request(protocol.connect())
+        asked = False
+        while not over.is_set():
+            writer.write(b"".join(protocol.data_to_send()))
+            try:
+                data = await asyncio.wait_for(reader.read(1 << 20), 0.5)
+            except TimeoutError:
+                continue
+            if not data:
+                break
+            protocol.receive_data(data)
+            events = protocol.events_received()
+            if not asked:
+                asked = True
+                for topic in topics:
+                    protocol.send_text(json.dumps({"op": "subscribe", "topic": topic}).encode())
+            for event in events if number == 0 and keep.is_set() else ():
+                if isinstance(event, Frame) and event.opcode in (Opcode.TEXT, Opcode.BINARY):
+                    data = bytes(event.data)
+                    kept.append((time.perf_counter(), data.decode() if event.opcode is Opcode.TEXT else data))
+        writer.close()
 
     async def all_of_them() -> None:
         await asyncio.gather(*(one(number) for number in range(CLIENTS)))

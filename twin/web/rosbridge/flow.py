@@ -29,64 +29,86 @@ class Flow:
     """What one client hears of one topic; several subscriptions count as one, as in rosbridge_library."""
 
     def __init__(self, send: Callable[[Frame], None], fault: Callable[[str], None]) -> None:
-        self.wanted: dict[str | None, Wanted] = {}
-        """By the id of the `subscribe`."""
         self.type: str | None = None
         """What the client expects."""
+        self.late: dict[Flow, None] = {}
+        """Where it is while something waits for its time, together with others."""
+        self._wanted: dict[str | None, Wanted] = {}
+        """By the id of the `subscribe`."""
+        self._in_all = Wanted()
+        """What all of them come to: this is looked at for each message."""
         self._send = send
         self._fault = fault
         self._last_s = float("-inf")
         self._queue: deque[Heard] = deque()
         self._told = ""
 
-    @property
-    def is_waiting(self) -> bool:
-        """Whether something waits for its time."""
-        return bool(self._queue)
+    def want(self, key: str | None, wanted: Wanted) -> None:
+        """Add what a `subscribe` of an id asks for, or change it."""
+        self._wanted[key] = wanted
+        self._sum_up()
+
+    def unwant(self, key: str | None) -> bool:
+        """Forget what was asked for with an id, all if there is none; return whether nothing is left."""
+        if key is None:
+            self._wanted.clear()
+        self._wanted.pop(key, None)
+        if self._wanted:
+            self._sum_up()
+        return not self._wanted
+
+    def _sum_up(self) -> None:
+        wanted = self._wanted.values()
+        sizes = [each.fragment_size for each in wanted if each.fragment_size is not None]
+        self._in_all = Wanted(
+            throttle_s=min(each.throttle_s for each in wanted),
+            queue_length=min(each.queue_length for each in wanted),
+            fragment_size=min(sizes, default=None),
+            compression=max((each.compression for each in wanted), key=COMPRESSIONS.index),
+        )
 
     def offer(self, heard: Heard, now_s: float) -> None:
         """Send a message, or let it wait, or drop it."""
-        throttle_s = min(wanted.throttle_s for wanted in self.wanted.values())
-        most = min(wanted.queue_length for wanted in self.wanted.values())
+        throttle_s = self._in_all.throttle_s
         if throttle_s <= 0.0:
             self._pass(heard)
         elif not self._queue and now_s - self._last_s >= throttle_s:
             self._last_s = now_s
             self._pass(heard)
-        elif most > 0:
+        elif self._in_all.queue_length > 0:
             self._queue.append(heard)
-            while len(self._queue) > most:
+            self.late[self] = None
+            while len(self._queue) > self._in_all.queue_length:
                 self._queue.popleft()
 
     def update(self, now_s: float) -> None:
         """Send what has waited long enough."""
-        throttle_s = min(wanted.throttle_s for wanted in self.wanted.values())
-        if self._queue and now_s - self._last_s >= throttle_s:
+        if self._queue and now_s - self._last_s >= self._in_all.throttle_s:
             self._last_s = now_s
             self._pass(self._queue.popleft())
+        if not self._queue:
+            self.late.pop(self, None)
 
     def forget(self) -> None:
         """Let nothing wait: what it is of is over."""
         self._queue.clear()
-
-    @property
-    def compression(self) -> Compression:
-        """The strongest that is asked for."""
-        return max((w.compression for w in self.wanted.values()), key=COMPRESSIONS.index)
+        self.late.pop(self, None)
 
     def _pass(self, heard: Heard) -> None:
         try:
-            if self.type not in (None, heard.sample.type):
+            if self.type is not None and self.type != heard.sample.type:
                 raise BridgeError(f"{heard.sample.topic} has the type {heard.sample.type}, not {self.type}")
-            frame = heard.frame(self.compression)
+            frame = heard.frame(self._in_all.compression)
         except BridgeError as error:
             if str(error) != self._told:
                 self._told = str(error)
                 self._fault(self._told)
             return
-        sizes = [w.fragment_size for w in self.wanted.values() if w.fragment_size is not None]
-        size = min(sizes, default=None)
-        for piece in in_fragments(frame, size, next(_numbers)) if size else (frame,):
+        size = self._in_all.fragment_size
+        if size is None:
+            self._send(frame)
+            return
+        for piece in in_fragments(frame, size, next(_numbers)):
             self._send(piece)
 
 
@@ -95,7 +117,6 @@ class Watch(Flow):
 
     def __init__(self, take: Callable[[Heard], None], forget: Callable[[], None] = lambda: None) -> None:
         super().__init__(lambda frame: None, lambda told: None)
-        self.wanted[None] = Wanted()
         self._take, self._forget = take, forget
 
     def forget(self) -> None:

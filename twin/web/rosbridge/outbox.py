@@ -45,16 +45,22 @@ class Outbox:
 
     def take(self) -> Frame | None:
         """Return what is to be sent next, None if there is nothing."""
+        return next(iter(self.take_up_to(1)), None)
+
+    def take_up_to(self, most_bytes: int) -> list[Frame]:
+        """Return what is to be sent next, frames of so many bytes; the last one may be longer."""
+        frames: list[Frame] = []
         with self._lock:
-            if self._answers:
-                frame = self._answers.popleft()
-            elif self._messages:
-                topic, frame = self._messages.popleft()
-                self._forget(topic)
-            else:
-                return None
-            self._bytes -= len(frame)
-            return frame
+            while most_bytes > 0 and (self._answers or self._messages):
+                if self._answers:
+                    frame = self._answers.popleft()
+                else:
+                    topic, frame = self._messages.popleft()
+                    self._forget(topic)
+                self._bytes -= len(frame)
+                most_bytes -= len(frame)
+                frames.append(frame)
+        return frames
 
     def _drop(self, index: int) -> None:
         topic, frame = self._messages[index]

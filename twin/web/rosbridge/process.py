@@ -49,6 +49,7 @@ class Rosbridge:
         self.bridge = Bridge(process.bus, self._graph, bridging, bag=bag)
         process.bus.started()
         self.server = Server(config, bridging.limits, process.bus.external.wake)
+        self.bridge.topics.urgent = lambda: self.server.stop(self.bridge)
         self.server.start()
 
     def spin(self, until: Callable[[], bool]) -> None:

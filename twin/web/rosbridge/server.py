@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from twin.errors import BridgeError
 from twin.web.rosbridge.access import ROLES, STOPS, Role, Token, matches
 from twin.web.rosbridge.bridge import Bridge, Limits
+from twin.web.rosbridge.delivery import Delivery, Recipient
 from twin.web.rosbridge.door import Door, given_token, is_loopback, peer_of
 from twin.web.rosbridge.frames import from_json, to_json
 from twin.web.rosbridge.http.answers import Http, response
@@ -66,26 +67,29 @@ class ServerConfig:
 class Connection:
     """A client as both threads see it."""
 
-    def __init__(self, name: str, role: Role | None, limits: Limits, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self,
+        name: str,
+        role: Role | None,
+        limits: Limits,
+        websocket: ServerConnection,
+        delivery: Delivery,
+    ) -> None:
         self.name = name
         self.role = role
         """None until it has told its token."""
         self.outbox = Outbox(limits.waiting_bytes)
+        self.recipient = Recipient(websocket, self.outbox)
         self.session: Session | None = None
         self.pending = 0
-        self.filled = asyncio.Event()
-        self._loop = loop
+        self._delivery = delivery
         self.rate = Bucket(limits.messages_per_s)
         self._told_s = 0.0
 
     def send(self, frame: str | bytes, topic: str | None) -> None:
         """Let a frame be sent; called in any thread."""
         self.outbox.put(frame, topic)
-        if not self.filled.is_set():
-            try:
-                self._loop.call_soon_threadsafe(self.filled.set)
-            except RuntimeError:
-                return  # the server has ended
+        self._delivery.wake(self.recipient)
 
     def refuse(self, why: str) -> None:
         """Tell a client, not more than once a second, that a message of it was dropped."""
@@ -119,6 +123,7 @@ class Server:
         self._fault: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._end: asyncio.Event | None = None
+        self._delivery: Delivery | None = None
         self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
 
     def start(self) -> None:
@@ -147,11 +152,15 @@ class Server:
             bridge.audit_stranger(*self._door.strangers.popleft())
         while self._jobs:
             self._jobs.popleft()(bridge)
-        for _ in range(len(self._events) + len(self._stops)):
-            event = self._stops.popleft() if self._stops else self._events.popleft() if self._events else None
-            if event is None:
-                return
-            self._do(bridge, event)
+        for _ in range(len(self._events)):
+            self.stop(bridge)
+            self._do(bridge, self._events.popleft())
+        self.stop(bridge)
+
+    def stop(self, bridge: Bridge) -> None:
+        """Do what overtakes all else; called in the bridge's thread, as often as you like."""
+        while self._stops:
+            self._do(bridge, self._stops.popleft())
 
     def _do(self, bridge: Bridge, event: _Event) -> None:
         connection = event.connection
@@ -186,6 +195,7 @@ class Server:
                 files = " and ".join(str(file) for file in (config.certificate, config.key) if file)
                 raise BridgeError(f"{files}: no certificate in PEM with its own key: {fault}") from None
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
+        self._delivery = Delivery(self._loop, self._limits.stalled_s)
         async with serve(
             self._on_client,
             config.address,
@@ -236,10 +246,10 @@ class Server:
         token: Token | None = getattr(websocket, "token", None)
         role = token.role if token else None if self._config.tokens else self._config.open_to
         peer = peer_of(websocket)
-        assert self._loop is not None
-        connection = Connection(token.name if token else peer, role, self._limits, self._loop)
+        assert self._delivery is not None
+        name = token.name if token else peer
+        connection = Connection(name, role, self._limits, websocket, self._delivery)
         self.connections.add(connection)
-        writer = asyncio.create_task(self._write(websocket, connection))
         try:
             if connection.role is None:
                 async with asyncio.timeout(_AUTH_S):
@@ -250,7 +260,7 @@ class Server:
             pass
         finally:
             self.connections.discard(connection)
-            writer.cancel()
+            connection.recipient.end()
             if connection.role is not None:
                 # With the stops: who steered and is gone is stopped before others are heard.
                 self._stops.append(_Event(connection, None))
@@ -290,24 +300,6 @@ class Server:
         connection.pending += 1
         (self._stops if is_stop else self._events).append(_Event(connection, message))
         self._wake()
-
-    async def _write(self, websocket: ServerConnection, connection: Connection) -> None:
-        from websockets.exceptions import ConnectionClosed
-
-        outbox = connection.outbox
-        try:
-            while True:
-                await connection.filled.wait()
-                connection.filled.clear()
-                while (frame := outbox.take()) is not None:
-                    async with asyncio.timeout(self._limits.stalled_s):
-                        await websocket.send(frame)
-                    if outbox.is_overfull:
-                        raise TimeoutError
-        except TimeoutError:
-            websocket.transport.abort()  # it reads nothing: a closing handshake would wait for it
-        except ConnectionClosed:
-            return
 
 
 def _is_stop(message: dict[str, Any]) -> bool:

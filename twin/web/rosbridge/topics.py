@@ -49,7 +49,9 @@ class Source:
         learner: Learner,
         now_s: Callable[[], float],
         history: History | None,
+        before: Callable[[], None],
     ) -> None:
+        self._before = before
         self._history = history if history is not None and history.has(topic) else None
         self.flows: dict[Hashable, Flow] = {}
         self._graph, self._topic, self._learner, self._now_s = graph, topic, learner, now_s
@@ -85,11 +87,13 @@ class Source:
             endpoint.node.destroy_subscription(endpoint)  # type: ignore[arg-type]
 
     def _on_sample(self, sample: RawSample) -> None:
+        self._before()
         heard = Heard(sample, self._codec(sample))
         if self._history is None:
             self._retain(sample, heard)
+        now_s = self._now_s()
         for flow in tuple(self.flows.values()):
-            flow.offer(heard, self._now_s())
+            flow.offer(heard, now_s)
 
     def _codec(self, sample: RawSample) -> Codec[Any] | None:
         key = sample.type, sample.type_hash
@@ -141,15 +145,17 @@ class Topics:
         self._history = history
         if history is not None:
             history.on_jump(self._forget)
+        self.urgent: Callable[[], None] = lambda: None
+        """Called before each message of the graph: what cannot wait until all that came are passed on."""
         self._sources: dict[str, Source] = {}
         self._outlets: dict[str, _Outlet] = {}
+        self._late: dict[Flow, None] = {}
+        """In which something waits for its time."""
 
     @property
     def is_waiting(self) -> bool:
         """Whether `update` has something to do soon."""
-        return any(outlet.held for outlet in self._outlets.values()) or any(
-            flow.is_waiting for source in self._sources.values() for flow in source.flows.values()
-        )
+        return bool(self._late) or any(outlet.held for outlet in self._outlets.values())
 
     def subscribe(
         self, session: Session, name: str, given: str | None, key: str | None, wanted: Wanted
@@ -169,7 +175,8 @@ class Topics:
             flow = Flow(
                 lambda frame: session.send(frame, topic), lambda told: session.status("error", told, key)
             )
-        flow.wanted[key] = wanted
+            flow.late = self._late
+        flow.want(key, wanted)
         flow.type = expected or flow.type
         if is_new:
             source.join(session, flow)
@@ -181,10 +188,7 @@ class Topics:
         flow = source.flows.get(session) if source else None
         if source is None or flow is None:
             return
-        if key is None:
-            flow.wanted.clear()
-        flow.wanted.pop(key, None)
-        if not flow.wanted:
+        if flow.unwant(key):
             self.unwatch(session, topic)
 
     def watch(
@@ -214,13 +218,24 @@ class Topics:
     def unwatch(self, who: Hashable, topic: str) -> None:
         """End what somebody hears of a topic; a topic that nobody hears any more is left."""
         source = self._sources.get(topic)
-        if source is not None and source.flows.pop(who, None) is not None and not source.flows:
+        flow = None if source is None else source.flows.pop(who, None)
+        if source is None or flow is None:
+            return
+        self._late.pop(flow, None)
+        if not source.flows:
             self._sources.pop(topic).destroy()
 
     def _source(self, topic: str, expected: str | None) -> Source:
         if topic not in self._sources:
             self._sources[topic] = Source(
-                self._node, self._graph, topic, expected, self._learner, self._now_s, self._history
+                self._node,
+                self._graph,
+                topic,
+                expected,
+                self._learner,
+                self._now_s,
+                self._history,
+                lambda: self.urgent(),
             )
         return self._sources[topic]
 
@@ -328,9 +343,8 @@ class Topics:
     def update(self) -> None:
         """Send what has waited long enough; forget publishers that nobody has needed for a while."""
         now_s = self._now_s()
-        for source in self._sources.values():
-            for flow in tuple(source.flows.values()):
-                flow.update(now_s)
+        for flow in tuple(self._late):
+            flow.update(now_s)
         for topic, outlet in tuple(self._outlets.items()):
             if outlet.held and (outlet.publisher.has_subscribers or now_s - outlet.since_s > _MEET_S):
                 while outlet.held:
