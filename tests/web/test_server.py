@@ -12,10 +12,13 @@ import time
 import urllib.error
 import urllib.request
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.protocol import State
+from websockets.server import ServerProtocol
 from websockets.sync.client import ClientConnection, connect
 
 from tests.processes import wait_for
@@ -27,7 +30,9 @@ from twin.bridge.msgs import String, Twist
 from twin.bridge.srvs import Trigger
 from twin.errors import BridgeError
 from twin.web.rosbridge.access import read_tokens
-from twin.web.rosbridge.bridge import BridgeConfig, Limits
+from twin.web.rosbridge.bridge import Bridge, BridgeConfig, Limits
+from twin.web.rosbridge.delivery import Recipient
+from twin.web.rosbridge.frames import Heard
 from twin.web.rosbridge.outbox import Outbox
 from twin.web.rosbridge.process import Rosbridge
 from twin.web.rosbridge.server import Server, ServerConfig
@@ -218,6 +223,58 @@ def test_a_stop_overtakes_what_waits_and_is_never_too_much() -> None:
         wait_for(lambda: "stop" in order and len(order) > 50)
     before = order.index("stop")
     assert before < 20, f"{before} messages were handled before the stop"
+
+
+def test_a_stop_is_done_between_two_messages_of_many_that_have_come() -> None:
+    order: list[str] = []
+    publishers: list[Any] = []
+
+    def audit(line: str) -> None:
+        order.extend("stop" for _ in range(json.loads(line)["target"] == "/guard/stop"))
+
+    def nodes(bus: Bus) -> None:
+        publishers.append(bus.create_node("crowd").create_publisher(String, "/crowd", 1000))
+
+    with (
+        serving(ServerConfig(port=0), nodes=nodes, audit=audit) as rosbridge,
+        connect(rosbridge.server.address) as client,
+    ):
+        client.send(json.dumps({"op": "advertise", "topic": "/guard/stop", "type": "std_msgs/Header"}))
+        wait_for(lambda: rosbridge.bridge.topics.type_of("/guard/stop"))
+
+        def take(heard: Heard) -> None:
+            order.append(heard.message.data)
+            if heard.message.data == "10":
+                client.send(json.dumps({"op": "publish", "topic": "/guard/stop", "msg": {}}))
+                wait_for(lambda: rosbridge.server.has_urgent)
+
+        def crowd(bridge: Bridge) -> None:
+            bridge.topics.watch("test", "/crowd", take)
+            for number in range(100):
+                publishers[0].publish(String(str(number)))
+
+        rosbridge.server.ask(crowd)
+        wait_for(lambda: order[-1:] == ["99"])
+    assert order == [*map(str, range(11)), "stop", *map(str, range(11, 100))]
+
+
+def test_all_that_waits_for_a_client_goes_out_in_one_write() -> None:
+    protocol, written = ServerProtocol(), []
+    protocol.state = State.OPEN
+    filled = 0
+    transport = SimpleNamespace(write=written.append, get_write_buffer_size=lambda: filled)
+    outbox = Outbox(10_000_000)
+    recipient = Recipient(SimpleNamespace(protocol=protocol, transport=transport), outbox)  # type: ignore[arg-type]
+    for frame, topic in (("text", "/a"), (b"binary", "/b"), ("answer", None)):
+        outbox.put(frame, topic)
+    assert recipient.write()
+    assert written == [b"\x81\x06answer" + b"\x81\x04text" + b"\x82\x06binary"]
+    assert recipient.write()
+    assert len(written) == 1, "nothing is left"
+    filled = 1_000_000
+    outbox.put("later", "/a")
+    assert not recipient.write()
+    assert len(written) == 1, "a client that does not keep up is waited for"
 
 
 def test_who_is_gone_while_it_steers_is_stopped() -> None:

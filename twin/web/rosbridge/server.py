@@ -118,7 +118,7 @@ class Server:
         self._jobs: deque[Callable[[Bridge], None]] = deque()
         """What clients without a websocket want of the bridge."""
         self._door = Door(config, wake)
-        self._http = Http(config, limits, self._door, self._ask, lambda: len(self.connections))
+        self._http = Http(config, limits, self._door, self.ask, lambda: len(self.connections))
         self._ready = threading.Event()
         self._fault: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -156,6 +156,11 @@ class Server:
             self.stop(bridge)
             self._do(bridge, self._events.popleft())
         self.stop(bridge)
+
+    @property
+    def has_urgent(self) -> bool:
+        """Whether `stop` has something to do."""
+        return bool(self._stops)
 
     def stop(self, bridge: Bridge) -> None:
         """Do what overtakes all else; called in the bridge's thread, as often as you like."""
@@ -236,7 +241,8 @@ class Server:
             websocket.token = token  # type: ignore[attr-defined]
         return None
 
-    def _ask(self, job: Callable[[Bridge], None]) -> None:
+    def ask(self, job: Callable[[Bridge], None]) -> None:
+        """Let the bridge's thread do something; called in any thread."""
         self._jobs.append(job)
         self._wake()
 
