@@ -28,7 +28,7 @@ check: $(VENV)/.ready  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, environments of gymnasium to theirs, a conversion to MuJoCo's compilation, messages to a put, a sweep to its runs in turn, eight futures to one; memory
+bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to its own physics and rays alone, layer by layer, environments of gymnasium to theirs, a conversion to MuJoCo's compilation, messages to a put, a sweep to its runs in turn, eight futures to one, lidars to their bare rays; memory; how long a stop takes
 	$(BIN)/python -m benchmarks.measures.start_cost
 	$(BIN)/python -m benchmarks.measures.convert_cost
 	$(BIN)/python -m benchmarks.measures.run_cost
@@ -39,10 +39,15 @@ bench: $(VENV)/.ready  ## CPU time as ratios: a start to bare imports, a run to 
 	$(BIN)/python -m benchmarks.measures.tracking
 	$(BIN)/python -m benchmarks.measures.sweep_cost
 	$(BIN)/python -m benchmarks.measures.futures_cost
+	$(BIN)/python -m benchmarks.measures.lidar_cost
+	$(BIN)/python -m benchmarks.measures.stop_latency
 
-soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory; a million steps of environments
+soak: $(VENV)/.ready  ## 60 km of random goals in the warehouse among people: collisions, recoveries, memory; a million steps of environments; an hour beside a robot that is killed and carried away; twenty clients of rosbridge
 	$(BIN)/python -m benchmarks.measures.soak
 	$(BIN)/python -m benchmarks.measures.env_memory
+	$(BIN)/python -m benchmarks.measures.live_soak --minutes 60
+	$(BIN)/python -m benchmarks.measures.live_accuracy --minutes 10
+	$(BIN)/python -m benchmarks.measures.web_cost --seconds 600
 
 fuzz: $(VENV)/.ready  ## 10 000 broken and hostile mesh files, checked and converted: none takes 5 s of CPU or 500 MB
 	$(BIN)/python -m tests.oracles.mesh_fuzz
