@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
 import multiprocessing
 import os
@@ -91,11 +92,13 @@ def broadcast(frames: Frames, ready: Any, ended: Any) -> None:
     """Send frames to all who are connected, when they are due, as plainly as can be; tell the CPU time."""
     from websockets.asyncio.server import broadcast as send
     from websockets.asyncio.server import serve
+    from websockets.exceptions import ConnectionClosed
 
     async def main() -> None:
         async def listen(connection: Any) -> None:
-            async for _ in connection:
-                pass
+            with contextlib.suppress(ConnectionClosed):
+                async for _ in connection:
+                    pass
 
         async with serve(listen, "127.0.0.1", 0, compression=None) as server:
             ready.put(server.sockets[0].getsockname()[1])
@@ -129,8 +132,8 @@ def memory_mb(pid: int) -> float:
 class Graph:
     """A node of this process, by which is known when something arrives in the graph."""
 
-    def __init__(self, process: live.LiveBus) -> None:
-        self.process = process
+    def __init__(self, process: live.LiveBus, endpoint: str) -> None:
+        self.process, self.endpoint = process, endpoint
         self.node = process.bus.create_node("measure")
         self.arrived: list[float] = []
         self.clock_ns = 0
@@ -198,7 +201,7 @@ def measure(seconds: float) -> Costs:
             wait_for_listener(endpoint)
             with program("rosbridge", *words) as bridge, live.join([endpoint]) as process:
                 wait_for_listener(f"tcp/127.0.0.1:{port}")
-                return beside(bridge.pid, f"ws://127.0.0.1:{port}", Graph(process), seconds)
+                return beside(bridge.pid, f"ws://127.0.0.1:{port}", Graph(process, endpoint), seconds)
 
 
 def started(*words: str) -> Any:
@@ -245,7 +248,7 @@ def beside(pid: int, address: str, graph: Graph, seconds: float) -> Costs:
             graph.process.spin(lambda: False, (seconds - KEPT_S) / 10.0)
             memory.append(memory_mb(pid))
         pace = (graph.clock_ns - began_ns) * 1e-9 / (time.perf_counter() - began_s)
-        stops = under_load(graph, operator)
+        stops = under_load(graph, operator, spawn)
         over.set()
         kept = get(out)
         crowd.join()
@@ -261,16 +264,26 @@ def beside(pid: int, address: str, graph: Graph, seconds: float) -> Costs:
     )
 
 
-def under_load(graph: Graph, operator: Any) -> list[float]:
+def under_load(graph: Graph, operator: Any, spawn: Any) -> list[float]:
     """Press stop again and again while a thousand messages a second go to all clients [ms]."""
-    publisher = graph.node.create_publisher(String, "/load", 100)
-    timer = graph.node.create_timer(
-        10_000_000, lambda: [publisher.publish(String("x" * 100)) for _ in range(LOAD_HZ // 100)]
-    )
+    crowd = spawn.Process(target=talk, args=(graph.endpoint,))
+    crowd.start()
     graph.process.spin(lambda: False, _SETTLE_S)
     stops = graph.ways(operator, "/guard/stop", STOPS)
-    timer.cancel()
+    crowd.terminate()
+    crowd.join()
     return stops
+
+
+def talk(endpoint: str) -> None:
+    """Publish a thousand messages a second until the process is ended."""
+    with live.join([endpoint]) as process:
+        node = process.bus.create_node("crowd")
+        publisher = node.create_publisher(String, "/load", 100)
+        node.create_timer(
+            10_000_000, lambda: [publisher.publish(String("x" * 100)) for _ in range(LOAD_HZ // 100)]
+        )
+        process.spin(lambda: False, 1e6)
 
 
 def plainly(frames: Frames, spawn: Any) -> float:
