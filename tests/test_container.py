@@ -7,12 +7,17 @@ import os
 import shutil
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from websockets.sync.client import connect
+
+from tests.processes import free_endpoint, wait_for_listener
 
 ROOT = Path(__file__).parents[1]
 PACKAGING = ROOT / "packaging"
@@ -92,6 +97,46 @@ def test_compose_says_commands_that_there_are(name: str) -> None:
     command = services()[name]["command"]
     assert "Usage" in run(sys.executable, "-m", "twin.cli", *command, "--help")
     assert services()[name]["network_mode"] == "host"
+
+
+@pytest.mark.long
+def test_what_compose_starts_meets(tmp_path: Path) -> None:
+    """The commands as they are, without containers, and at ports that are free."""
+    endpoint, page = free_endpoint(), free_endpoint()
+    folder = services()["run"]["volumes"][0].partition(":")[2]
+
+    def command(name: str, *more: str) -> list[str]:
+        words = [str(word) for word in services()[name]["command"]]
+        words = [word.replace("tcp/127.0.0.1:7447", endpoint) for word in words]
+        return [
+            sys.executable,
+            "-m",
+            "twin.cli",
+            *(word.replace(folder, str(tmp_path)) for word in words),
+            *more,
+        ]
+
+    with ExitStack() as stack:
+
+        def start(name: str, *more: str) -> None:
+            process = subprocess.Popen(
+                command(name, *more), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
+            stack.callback(process.wait, 100)
+            stack.callback(process.terminate)
+
+        start("router", "--listen", endpoint)
+        wait_for_listener(endpoint)
+        start("run")
+        start("page", "--port", page.rpartition(":")[2])
+        wait_for_listener(page)
+        address = page.removeprefix("tcp/")
+        with urllib.request.urlopen(f"http://{address}/", timeout=60.0) as answer:
+            assert b"<html" in answer.read()
+        with connect(f"ws://{address}", max_size=None) as client:
+            client.send(json.dumps({"op": "subscribe", "topic": "/odom"}))
+            heard = json.loads(client.recv(timeout=100.0))
+        assert heard["topic"] == "/odom"
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze to ask")
