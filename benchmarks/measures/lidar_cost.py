@@ -102,7 +102,7 @@ def of_images(world: str, rounds: int, folder: Path) -> None:
 
         def bare() -> None:
             for number in range(4):
-                renderer.update_scene(data, f"camera {number}", option)
+                renderer.update_scene(data, f"camera {number}.0", option)
                 for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
                     renderer.scene.flags[flag] = 0
                 renderer.render()

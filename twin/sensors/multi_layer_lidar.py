@@ -18,7 +18,7 @@ from twin.sensors.clouds.layouts import LAYOUTS, Driver
 from twin.sensors.ray_elements import ray_child, read_method, read_noise, read_reach
 from twin.sim.sensors import Mount
 from twin.sim.sensors.depth_images import DepthImages, size_of
-from twin.sim.sensors.rays import RayBuffers, RayCaster
+from twin.sim.sensors.rays import RayCaster
 
 MOST_PIXELS = 4096
 """Along an edge of a depth image."""
@@ -143,8 +143,7 @@ class MultiLayerLidar(CloudLidar):
             images = DepthImages(self.mount, self._parts[0], size=size, reach=reach, name=spec.name)
             self._directions[:] = images.own_directions.T
             return [images]
-        room = RayBuffers.of(max(map(len, self._parts)))
-        return [RayCaster(self.mount, part, cutoff=spec.range_max, buffers=room) for part in self._parts]
+        return list(RayCaster.of_turn(self.mount, self._parts, cutoff=spec.range_max))
 
     def _look(self, group: int) -> tuple[Array, Array]:
         eyes = self._eyes[group]

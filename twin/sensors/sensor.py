@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
+import numpy as np
+
 from twin.bridge.msgs import Header
 from twin.convert.ledger.fates import Fate
 from twin.convert.sensors import SensorBuilder
@@ -46,7 +48,11 @@ class Sensor(ABC):
 
     def _normal(self, time_ns: int, n: int) -> Array:
         """Return `n` standard normal numbers, shape (n,), the same at the same time, seed and name."""
-        return self._stream.normal(time_ns // self.mount.world.timestep_ns, n)
+        return self._fill_normal(time_ns, np.empty(n))
+
+    def _fill_normal(self, time_ns: int, out: Array) -> Array:
+        """Write the same numbers into `out`, shape (n,), and return it."""
+        return self._stream.fill_normal(time_ns // self.mount.world.timestep_ns, out)
 
     @classmethod
     @abstractmethod

@@ -35,8 +35,12 @@ class NoiseStream:
 
     def normal(self, tick: int, n: int) -> Array:
         """Return `n` standard normal numbers of `tick` (>= 0), shape (n,)."""
+        return self.fill_normal(tick, np.empty(n))
+
+    def fill_normal(self, tick: int, out: Array) -> Array:
+        """Write the same numbers into `out`, shape (n,), and return it."""
         self._seek(tick, _NORMAL)
-        return self._generator.standard_normal(n)
+        return self._generator.standard_normal(out=out)
 
     def uniform(self, tick: int, n: int) -> Array:
         """Return `n` uniform numbers in [0, 1) of `tick` (>= 0), shape (n,); independent of `normal`."""

@@ -13,6 +13,7 @@ from twin.geometry import Array, Pose3
 from twin.models.shapes import Box
 from twin.sim.compose import GROUP_COLLISION, GROUP_SOLID
 from twin.sim.scene import FreeBody, Scene, Shape, StaticBody
+from twin.sim.sensors.rays import RayCaster
 from twin.sim.world import World
 
 
@@ -24,7 +25,7 @@ def _slab(name: str, xyz: tuple[float, float, float], rpy: tuple[float, float, f
     )
 
 
-def _yard() -> Scene:
+def _yard(cranes: int = 6) -> Scene:
     """Slabs at all heights and attitudes, and unbalanced bodies."""
     rng = np.random.default_rng(3)
     slabs = [
@@ -37,7 +38,7 @@ def _yard() -> Scene:
         Shape(geometry=Box(size=(0.4, 0.4, 0.4)), T_body_geometry=Pose3.from_xyz_rpy((-0.6, 0.0, 0.0))),
         Shape(geometry=Box(size=(0.9, 0.05, 0.05)), T_body_geometry=Pose3.from_xyz_rpy((0.3, 0.0, 0.1))),
     )
-    cranes = [
+    unbalanced = [
         FreeBody(
             name=f"crane{i}",
             T_world_body=Pose3.from_xyz_rpy(
@@ -47,23 +48,27 @@ def _yard() -> Scene:
             friction=0.5,
             shapes=arms,
         )
-        for i in range(6)
+        for i in range(cranes)
     ]
     return Scene(
-        name="yard", statics=(*slabs, box("wall", (5.0, 0.0, 0.5), (0.2, 9.0, 1.0))), goods=tuple(cranes)
+        name="yard", statics=(*slabs, box("wall", (5.0, 0.0, 0.5), (0.2, 9.0, 1.0))), goods=tuple(unbalanced)
     )
 
 
 def _one_by_one(world: World, link: str, spec_angles: Array) -> Array:
+    flat = np.column_stack((np.cos(spec_angles), np.sin(spec_angles), np.zeros(len(spec_angles))))
+    return _ray_by_ray(world, link, flat)
+
+
+def _ray_by_ray(world: World, link: str, directions: Array) -> Array:
     body = world.model.body(link).id
     groups = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
     groups[[GROUP_SOLID, GROUP_COLLISION]] = 1
     turn, hit = world.data.xmat[body].reshape(3, 3), np.zeros(1, dtype=np.int32)
     result = []
-    for angle in spec_angles:
-        ray = turn @ (np.cos(angle), np.sin(angle), 0.0)
+    for direction in directions:
         distance = mujoco.mj_ray(
-            world.model, world.data, world.data.xpos[body], ray, groups, 1, body, hit, None
+            world.model, world.data, world.data.xpos[body], turn @ direction, groups, 1, body, hit, None
         )
         result.append(np.inf if distance < 0.0 or distance > LIDAR.range_max else distance)
     return np.array(result)
@@ -96,3 +101,29 @@ def test_a_robot_that_drives_over_bumps_sees_what_single_rays_hit() -> None:
         world.step()
         truth = _one_by_one(world, "cart/laser", np.linspace(spec.angle_min, spec.angle_max, spec.samples))
         np.testing.assert_allclose(cart.sensors[0].sample(world.time_ns).ranges, truth, atol=1e-9)
+
+
+@pytest.mark.parametrize("cranes", [6, 30])
+def test_bundles_of_a_lidar_that_is_moved_about_meet_what_single_rays_hit(cranes: int) -> None:
+    """Bundles are looked beside together, and anew when the link has moved, however slowly."""
+    spec, rng = replace(LIDAR, samples=2), np.random.default_rng(5)
+    world = World.compose(_yard(cranes), [placed(Pose3.from_xyz_rpy(), "kinematic", sensors=(spec,))])
+    cart, place, turn = world.robots["cart"], np.array([0.0, 0.0, 0.05]), np.zeros(3)
+    azimuth, elevation = np.meshgrid(np.linspace(-3.0, 3.0, 50), np.linspace(-0.3, 0.4, 4), indexing="ij")
+    level = np.cos(elevation)
+    rays = np.stack((np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation)), axis=-1)
+    parts = [part.reshape(-1, 3) for part in np.array_split(rays, 10)]
+    casters = RayCaster.of_turn(cart.sensors[0].mount, parts, cutoff=LIDAR.range_max)
+    groups, counts = world.model.geom_group.copy(), world.model.body_geomnum.copy()
+    for step in range(60):
+        place += rng.normal((0.01, 0.0, 0.0), 0.005)
+        turn += rng.normal((0.0, 0.0, 0.01), 0.002)
+        cart.set_kinematic_pose(Pose3.from_xyz_rpy(place, turn))
+        world.step()
+        number = step % len(parts)
+        found = casters[number].cast()
+        truth = _ray_by_ray(world, "cart/laser", parts[number])
+        np.testing.assert_allclose(np.where(found > LIDAR.range_max, np.inf, found), truth, atol=1e-9)
+        assert np.isfinite(truth).any()
+    np.testing.assert_array_equal(world.model.geom_group, groups)
+    np.testing.assert_array_equal(world.model.body_geomnum, counts)
