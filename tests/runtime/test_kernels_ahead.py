@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -34,3 +36,31 @@ def test_a_paced_run_has_its_kernels_before_and_says_the_same(
         run.advance()
         digests.append(run.finish().digest)
     assert digests[0] == digests[1]
+
+
+_LATE = """
+import gc, sys
+from numba.core.registry import CPUDispatcher
+from twin.runtime.open_run import OpenRun
+from twin.scenario.schema import load
+
+def kernels():
+    found = (each for each in gc.get_objects() if isinstance(each, CPUDispatcher))
+    return {f"{each.py_func.__name__}{types}" for each in found for types in each.overloads}
+
+run = OpenRun(load(sys.argv[1], {"duration": "30 s"}), record=False, pace=1000.0)
+before = kernels()
+run.advance()
+assert run.run.world.time_ns >= 29e9
+print(*sorted(kernels() - before), sep="\\n")
+"""
+
+
+def test_a_paced_run_stops_for_no_compiler() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _LATE, SCENARIOS / "warehouse_patrol.yaml"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split("\n") == ["", ""]

@@ -78,12 +78,29 @@ def warm_up_keepout() -> None:
 @ahead
 @cache
 def warm_up_planning() -> None:
-    """Plan and smooth a path. The planners that search in all headings compile when they first plan."""
+    """Plan, smooth and check a path, and its goal.
+
+    The planners that search in all headings compile when they first plan.
+    """
+    from twin.navigation.costmaps.kernels import footprint_hits
+    from twin.navigation.planning.path_validity import blocked_poses
     from twin.navigation.planning.planner import ThetaStar
     from twin.navigation.planning.smoother import SimpleSmoother
 
-    costmap = _costmap().costmap
-    SimpleSmoother().smooth(ThetaStar().create_plan(costmap, _START, _GOAL), costmap)
+    layered = _costmap()
+    costmap = layered.costmap
+    path = SimpleSmoother().smooth(ThetaStar().create_plan(costmap, _START, _GOAL), costmap)
+    blocked_poses(path, _START, costmap, costmap, layered.config.polygon)
+    footprint_hits(costmap.costs, layered.config.polygon, (1.0, 1.0, 0.0), costmap.frame)
+
+
+@ahead
+@cache
+def warm_up_reach() -> None:
+    """Look what can be reached."""
+    from twin.navigation.exploration.wavefront import travel_distances
+
+    travel_distances(np.ones((2, 2), dtype=np.bool_), np.full((2, 2), np.inf))
 
 
 @ahead
@@ -151,7 +168,7 @@ def warm_up_localisation() -> None:
     field.log_likelihood(np.ones((2, 3)), beams, 0.0, 0.1)
     regularised(np.ones((2, 3)), clusters(np.ones((2, 3))), np.ones((2, 3)))
     tempered_weights(np.zeros(2), np.zeros(2), 1.0, 1.0)
-    same_surface(np.ones((2, 2)), np.ones((2, 2)), 0.05)
+    same_surface(np.ones((2, 2)), np.asfortranarray(np.ones((2, 2))), 0.05)
 
 
 @ahead

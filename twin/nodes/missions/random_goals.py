@@ -16,6 +16,7 @@ from twin.geometry import Array, Pose2
 from twin.navigation.exploration.wavefront import travel_distances
 from twin.navigation.maps.clearance import clearance as clearance_of
 from twin.navigation.maps.occupancy_map import OccupancyMap
+from twin.navigation.warm_up import warm_up_reach
 from twin.nodes.messages import pose_stamped
 from twin.nodes.missions.mission_node import PERIOD_NS, MissionNode
 from twin.nodes.missions.random_goals_config import RandomGoalsConfig
@@ -55,6 +56,7 @@ class RandomGoalsNode(MissionNode):
         """Goals so far."""
         self.failed = 0
         """Goals so far that the navigator gave up."""
+        warm_up_reach()
         self._navigate = ActionClient(self.node, NavigateToPose, "navigate_to_pose")
         self.node.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
         self.node.create_subscription(Odometry, "odom", self._on_odom, 1, frozen=True)
