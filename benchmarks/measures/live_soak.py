@@ -15,6 +15,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,8 +28,8 @@ KIDNAPPED_S, STOPPED_S, SLOWED_S, KILLED_S, AGAIN_S = 90.0, 150.0, 210.0, 280.0,
 """When, in a round; the robot is there some seconds after it was started."""
 MOST = 300
 """Letters of a line."""
-EARLY_S, FIRST_EARLY_S = 6.0, 20.0
-"""A robot that was there sooner is carried away sooner; the first is there before the mirror is built."""
+EARLY_S = 6.0
+"""A robot that was there sooner is carried away sooner; the first by as much as it waited for the mirror."""
 DEGRADED_S = 0.6
 """After a robot falls silent the label may say `twin` for so long."""
 RECOVERED_S = 30.0
@@ -79,6 +80,7 @@ def soak(minutes: float) -> None:
 
     robot = Robot(free_endpoint())
     robot.start()
+    started_s = time.monotonic()
     done: list[tuple[float, str]] = []
     seconds: list[tuple[float, str]] = []
     memory: list[float] = []
@@ -89,6 +91,7 @@ def soak(minutes: float) -> None:
     with Mirror(scenario, LiveSource(network), autonomy="all") as mirror:
         (mirrored,) = mirror.robots
         world = mirror.run.run.world
+        early_s = time.monotonic() - started_s
         plan = script(robot, minutes * 60.0)
 
         def tick() -> bool:
@@ -108,12 +111,14 @@ def soak(minutes: float) -> None:
 
         mirror.advance(tick)
     robot.kill()
-    begins = [at_s - EARLY_S for at_s, _ in done] + [minutes * 60.0]
+    begins = [at_s - (EARLY_S if at_s > ROUND_S else early_s) for at_s, _ in done] + [minutes * 60.0]
     for (at_s, what), since_s, until_s in zip(done, begins, begins[1:], strict=False):
         words = [text for told_s, text in told if since_s <= told_s < until_s]
         print(f"{at_s:7.1f} s  {what:10} {'; '.join(dict.fromkeys(words)) or 'NOTHING TOLD'}"[:MOST])
     wrong = [
-        (at_s, label, want) for at_s, label in seconds if (want := expected(at_s, done)) and label != want
+        (at_s, label, want)
+        for at_s, label in seconds
+        if (want := expected(at_s, done, early_s)) and label != want
     ]
     print(f"label: {len(seconds)} s, wrong in {len(wrong)}: {wrong[:20]}")
     resets = [f"{at_s:.1f} s {text}" for at_s, text in told if text.startswith("reset: ")]
@@ -140,11 +145,11 @@ def script(robot: Robot, length_s: float) -> list[tuple[float, str, Any]]:
     return plan
 
 
-def expected(at_s: float, done: list[tuple[float, str]]) -> str | None:
+def expected(at_s: float, done: list[tuple[float, str]], first_early_s: float) -> str | None:
     """Return the label that is right, None where more than one is."""
     since = [(at_s - began_s, what) for began_s, what in done if began_s <= at_s]
     passed_s, what = since[-1] if since else (at_s, "started")
-    early_s = FIRST_EARLY_S if at_s < ROUND_S else EARLY_S
+    early_s = first_early_s if at_s < ROUND_S else EARLY_S
     if any(what == "kidnapped" and 0.0 < began_s - at_s < early_s for began_s, what in done):
         return None
     if what == "stopped" and DEGRADED_S < passed_s < 3.0:
