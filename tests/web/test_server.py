@@ -267,13 +267,13 @@ def test_all_that_waits_for_a_client_goes_out_in_one_write() -> None:
     recipient = Recipient(SimpleNamespace(protocol=protocol, transport=transport), outbox)  # type: ignore[arg-type]
     for frame, topic in (("text", "/a"), (b"binary", "/b"), ("answer", None)):
         outbox.put(frame, topic)
-    assert recipient.write()
+    assert recipient.write({})
     assert written == [b"\x81\x06answer" + b"\x81\x04text" + b"\x82\x06binary"]
-    assert recipient.write()
+    assert recipient.write({})
     assert len(written) == 1, "nothing is left"
     filled = 1_000_000
     outbox.put("later", "/a")
-    assert not recipient.write()
+    assert not recipient.write({})
     assert len(written) == 1, "a client that does not keep up is waited for"
 
 

@@ -6,6 +6,7 @@ import asyncio
 from collections import deque
 from typing import TYPE_CHECKING
 
+from twin.web.rosbridge.frames import Frame
 from twin.web.rosbridge.outbox import Outbox
 
 if TYPE_CHECKING:
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 _BATCH_BYTES = 65_536
 """Written at once; a client of which that much has not gone out is waited for."""
-_EVERY_S = 0.005
+_EVERY_S = 0.01
 """Deliveries are no closer [s]: what comes in between goes out together."""
 
 
@@ -52,10 +53,11 @@ class Delivery:
             return
         self._last_s = now_s
         self._is_called = False
+        packed: dict[int, tuple[Frame, bytes]] = {}
         while self._filled:
             recipient = self._filled.popleft()
             recipient.is_filled = False
-            if recipient.waiting is None and not recipient.write():
+            if recipient.waiting is None and not recipient.write(packed):
                 recipient.waiting = asyncio.create_task(recipient.wait(self._stalled_s))
 
 
@@ -69,8 +71,13 @@ class Recipient:
         """Of a client that does not keep up."""
         self._websocket, self._outbox = websocket, outbox
 
-    def write(self) -> bool:
-        """Write what waits; return whether that was all."""
+    def write(self, packed: dict[int, tuple[Frame, bytes]]) -> bool:
+        """Write what waits; return whether that was all.
+
+        Args:
+            packed: Bytes of frames that go to several clients, by identity, with the frames: what is there is
+                not made again.
+        """
         from websockets.protocol import State
 
         websocket, outbox = self._websocket, self._outbox
@@ -80,11 +87,9 @@ class Recipient:
             if not frames or protocol.state is not State.OPEN:
                 return True
             for frame in frames:
-                if isinstance(frame, str):
-                    protocol.send_text(frame.encode())
-                else:
-                    protocol.send_binary(frame)
-            transport.write(b"".join(protocol.data_to_send()))
+                if id(frame) not in packed:
+                    packed[id(frame)] = frame, _packed(frame)
+            transport.write(b"".join([packed[id(frame)][1] for frame in frames]))
         return False
 
     async def wait(self, stalled_s: float) -> None:
@@ -92,7 +97,7 @@ class Recipient:
         from websockets.exceptions import ConnectionClosed
 
         try:
-            while not self.write():
+            while not self.write({}):
                 frame = self._outbox.take()
                 if self._outbox.is_overfull:
                     raise TimeoutError
@@ -110,3 +115,13 @@ class Recipient:
         """Write no more."""
         if self.waiting is not None:
             self.waiting.cancel()
+
+
+def _packed(frame: Frame) -> bytes:
+    """Return what travels of a frame of a server without compression: it is the same for all clients."""
+    from websockets.frames import Frame as Wire
+    from websockets.frames import Opcode
+
+    is_text = isinstance(frame, str)
+    data = frame.encode() if isinstance(frame, str) else frame
+    return Wire(Opcode.TEXT if is_text else Opcode.BINARY, data).serialize(mask=False)

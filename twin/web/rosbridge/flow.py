@@ -28,7 +28,9 @@ class Wanted:
 class Flow:
     """What one client hears of one topic; several subscriptions count as one, as in rosbridge_library."""
 
-    def __init__(self, send: Callable[[Frame], None], fault: Callable[[str], None]) -> None:
+    def __init__(
+        self, topic: str, send: Callable[[Frame, str | None], None], fault: Callable[[str], None]
+    ) -> None:
         self.type: str | None = None
         """What the client expects."""
         self.late: dict[Flow, None] = {}
@@ -37,7 +39,7 @@ class Flow:
         """By the id of the `subscribe`."""
         self._in_all = Wanted()
         """What all of them come to: this is looked at for each message."""
-        self._send = send
+        self._topic, self._send = topic, send
         self._fault = fault
         self._last_s = float("-inf")
         self._queue: deque[Heard] = deque()
@@ -106,17 +108,17 @@ class Flow:
             return
         size = self._in_all.fragment_size
         if size is None:
-            self._send(frame)
+            self._send(frame, self._topic)
             return
         for piece in in_fragments(frame, size, next(_numbers)):
-            self._send(piece)
+            self._send(piece, self._topic)
 
 
 class Watch(Flow):
     """A topic for who is no client of the protocol: each message as it came."""
 
     def __init__(self, take: Callable[[Heard], None], forget: Callable[[], None] = lambda: None) -> None:
-        super().__init__(lambda frame: None, lambda told: None)
+        super().__init__("", lambda frame, topic: None, lambda told: None)
         self._take, self._forget = take, forget
 
     def forget(self) -> None:

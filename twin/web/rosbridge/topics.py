@@ -172,9 +172,7 @@ class Topics:
         flow = source.flows.get(session)
         is_new = flow is None
         if flow is None:
-            flow = Flow(
-                lambda frame: session.send(frame, topic), lambda told: session.status("error", told, key)
-            )
+            flow = Flow(topic, session.send, lambda told: session.status("error", told, key))
             flow.late = self._late
         flow.want(key, wanted)
         flow.type = expected or flow.type
