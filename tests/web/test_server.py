@@ -27,6 +27,7 @@ from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.live import LiveBus
 from twin.bridge.msgs import String, Twist
+from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import Trigger
 from twin.errors import BridgeError
 from twin.web.rosbridge.access import read_tokens
@@ -272,6 +273,7 @@ def test_all_that_waits_for_a_client_goes_out_in_one_write() -> None:
     assert recipient.write({})
     assert len(written) == 1, "nothing is left"
     filled = 1_000_000
+    assert recipient.write({}), "nothing waits, so nobody does, however much is on its way"
     outbox.put("later", "/a")
     assert not recipient.write({})
     assert len(written) == 1, "a client that does not keep up is waited for"
@@ -291,6 +293,16 @@ def test_who_is_gone_while_it_steers_is_stopped() -> None:
         wait_for(lambda: heard == [0.3, 0.0])
 
 
+def subscribed(address: str, topic: str) -> socket.socket:
+    """Return a client's socket from which nothing is read."""
+    lazy = socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2])))
+    lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    lazy.sendall(HANDSHAKE)
+    text = json.dumps({"op": "subscribe", "topic": topic}).encode()
+    lazy.sendall(bytes([0x81, 0x80 | len(text)]) + bytes(4) + text)
+    return lazy
+
+
 def test_who_reads_nothing_is_given_up_and_others_hear() -> None:
     limits = Limits(stalled_s=0.5, waiting_bytes=1_000_000)
     talking = threading.Event()
@@ -305,15 +317,9 @@ def test_who_reads_nothing_is_given_up_and_others_hear() -> None:
     with serving(ServerConfig(port=0), limits, nodes) as server:
         address = server.server.address
         with connect(address, max_size=None) as reader:
-            lazy = socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2])))
-            lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-            key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-            lazy.sendall(f"GET / HTTP/1.1\r\nHost: localhost\r\n{upgrade}{key}\r\n".encode())
-            text = json.dumps({"op": "subscribe", "topic": "/big"}).encode()
-            lazy.sendall(bytes([0x81, 0x80 | len(text)]) + bytes(4) + text)
+            lazy = subscribed(address, "/big")
             wait_for(lambda: len(server.server.connections) == 2)
-            reader.send(text.decode())
+            reader.send(json.dumps({"op": "subscribe", "topic": "/big"}))
             waiting = []
 
             def is_gone() -> bool:
@@ -325,6 +331,21 @@ def test_who_reads_nothing_is_given_up_and_others_hear() -> None:
             assert max(waiting) <= 1_300_000
             talking.set()
             lazy.close()
+
+
+def test_a_large_message_that_somebody_does_not_read_holds_up_nobody() -> None:
+    def nodes(bus: Bus) -> None:
+        bus.create_node("map").create_publisher(String, "/map", LATCHED).publish(String("x" * 10_000_000))
+
+    with (
+        serving(ServerConfig(port=0), nodes=nodes) as rosbridge,
+        connect(rosbridge.server.address) as other,
+        subscribed(rosbridge.server.address, "/map") as lazy,
+    ):
+        assert lazy.recv(1)  # of the handshake
+        for _ in range(20):
+            assert "/map" in topics(other)["values"]["topics"]
+            time.sleep(0.02)
 
 
 def test_newer_messages_win() -> None:

@@ -127,6 +127,24 @@ def test_commands_reach_the_virtual_robot_when_they_reach_the_physical_one(asked
     assert apart(0) < apart(1), "the virtual one is not behind"
 
 
+@pytest.mark.parametrize(("here", "late_ns"), [(True, 20_000_000), (False, 0)])
+def test_what_the_robot_commands_itself_has_come_a_long_way_already(
+    here: bool, late_ns: int, tmp_path: Path
+) -> None:
+    told: dict[str, list[Any]] = {"/cmd_vel": [], "/twin/cmd_vel": []}
+    with beside(tmp_path) as both:
+        (robot,) = both.mirror.robots
+        both.until(1.0)
+        if not here:
+            vars(robot)["_own_commands"] = set()
+        both.run.run.bus.tap(lambda sample: told.get(sample.topic, []).append(sample))
+        both.until(3.0)
+    relayed = {id(sample.message): sample.time_ns for sample in told["/twin/cmd_vel"]}
+    said = [sample for sample in told["/cmd_vel"] if id(sample.message) in relayed]
+    assert len(said) > 30
+    assert {relayed[id(sample.message)] - sample.time_ns for sample in said} == {late_ns}
+
+
 def test_the_mirror_says_the_same_whether_it_is_asked_or_not(asked_once: Driven, tmp_path: Path) -> None:
     alone = Driven(tmp_path, 3.0, asks=False)
     assert len(alone.commands) > 100

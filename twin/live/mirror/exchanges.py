@@ -13,6 +13,7 @@ from twin.live.mirror.clock_offset import ClockOffset, Offset
 
 _PERIOD_NS = 100_000_000
 _TIMEOUT_S = 10.0
+"""An answer that takes longer tells nothing of a clock; Zenoh keeps every question for so long [s]."""
 _DEPTH = 100
 """So many answers may wait, and so many questions may be open."""
 

@@ -124,9 +124,9 @@ class MirroredRobot:
         self._commands = node.create_subscription(
             Twist, f"{space}/cmd_vel", self._on_command, 10, frozen=True
         )
-        relayed = node.create_publisher(Twist, "cmd_vel", 10)
+        self._relayed = node.create_publisher(Twist, "cmd_vel", 10)
         self._tick_s = context.control_period_ns * 1e-9
-        self._underway = Underway[Twist](lambda message: relayed.publish(message, frozen=True))
+        self._underway = Underway[Twist](self._relay)
         self.guard: GuardClient | None = None
         if guard is not None:
             self.guard = GuardClient(node, guard=f"{space}/{guard}")
@@ -334,8 +334,15 @@ class MirroredRobot:
         is_own = source is not None and source.gid in self._own_commands
         if is_own:
             self.obedience.command(now_ns, message.linear.x, message.angular.z)
-        if self._flows():
+        if not self._flows():
+            return
+        if is_own:
             self._underway.send(now_ns, message)
+        else:  # it comes from the robot, which has it already
+            self._relay(message)
+
+    def _relay(self, message: Twist) -> None:
+        self._relayed.publish(message, frozen=True)
 
     def _flows(self) -> bool:
         """Return whether commands reach the physical robot, as far as can be told: it is heard.

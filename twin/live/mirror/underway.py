@@ -34,5 +34,5 @@ class Underway(Generic[M]):
             self._arrived(self._sent.popleft()[1])
 
     def forget(self) -> None:
-        """Carry nothing any more: times are of another clock from now on, or the robot hears nothing."""
+        """Carry nothing any more: times are of another clock from now on."""
         self._sent.clear()

@@ -82,15 +82,15 @@ class Recipient:
 
         websocket, outbox = self._websocket, self._outbox
         protocol, transport = websocket.protocol, websocket.transport
-        while transport.get_write_buffer_size() < _BATCH_BYTES and not outbox.is_overfull:
+        while not outbox.is_empty and protocol.state is State.OPEN:
+            if outbox.is_overfull or transport.get_write_buffer_size() >= _BATCH_BYTES:
+                return False
             frames = outbox.take_up_to(_BATCH_BYTES)
-            if not frames or protocol.state is not State.OPEN:
-                return True
             for frame in frames:
                 if id(frame) not in packed:
                     packed[id(frame)] = frame, _packed(frame)
             transport.write(b"".join([packed[id(frame)][1] for frame in frames]))
-        return False
+        return True
 
     async def wait(self, stalled_s: float) -> None:
         """Write as fast as the client reads, until nothing waits; disconnect one that reads nothing."""

@@ -43,6 +43,11 @@ class Outbox:
                 self._drop(0)
             self.is_overfull |= self._bytes > 4 * self._most_bytes
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing waits."""
+        return not self._answers and not self._messages
+
     def take(self) -> Frame | None:
         """Return what is to be sent next, None if there is nothing."""
         return next(iter(self.take_up_to(1)), None)
