@@ -14,6 +14,7 @@ from twin.clouds.deskewing import deskewed
 from twin.clouds.filters import crop_box, voxel_grid
 from twin.clouds.planes import fit_plane
 from twin.clouds.points import coordinates, make_points, transformed
+from twin.clouds.times import timed
 from twin.errors import CloudError
 from twin.geometry import Pose3
 
@@ -122,6 +123,35 @@ def test_deskewing_puts_every_point_where_it_was_at_the_stamp() -> None:
     np.testing.assert_allclose(coordinates(deskewed(cloud, pose_at)), fixed, atol=1e-5)
     with pytest.raises(CloudError, match="no field 'time'"):
         deskewed(make_points(seen), pose_at)
+
+
+@pytest.mark.parametrize("stamp", [0.0, 0.06, 5.3, 1_790_000_000.25])
+@pytest.mark.parametrize(
+    ("field", "kind", "unit", "from_stamp"),
+    [
+        ("time", "<f4", 1.0, True),  # velodyne
+        ("t", "<u4", 1e9, True),  # ouster
+        ("timestamp", "<f8", 1e9, False),  # livox_ros_driver2
+        ("timestamp", "<f8", 1.0, False),  # hesai, rslidar
+        ("time", "<f8", 1.0, True),
+    ],
+)
+def test_times_are_seconds_after_the_stamp_whichever_driver_tells_them(
+    field: str, kind: str, unit: float, from_stamp: bool, stamp: float
+) -> None:
+    after = np.linspace(0.0, 0.1, 11)
+    told = (after + (0.0 if from_stamp else stamp)) * unit
+    cloud = with_field(make_points(np.ones((11, 3))), field, told, kind)
+    found = timed(cloud, stamp)
+    np.testing.assert_allclose(found["time"], after, atol=1e-6)
+    assert coordinates(found).tolist() == [[1, 1, 1]] * 11
+
+
+def test_a_cloud_that_tells_no_times_is_left_as_it_is() -> None:
+    cloud = make_points([(1, 2, 3)])
+    assert timed(cloud, 5.0) is cloud
+    silent = with_field(cloud, "timestamp", math.nan, "<f8")
+    assert timed(silent, 5.0) is silent
 
 
 def test_a_cloud_without_coordinates_is_told_what_it_lacks() -> None:

@@ -22,6 +22,7 @@ from twin.bridge.qos import SENSOR_DATA
 from twin.bridge.tf import TransformBroadcaster, TransformBuffer, TransformError, transform_stamped
 from twin.clouds.odometry import CloudOdometry, CloudOdometryConfig
 from twin.clouds.points import XYZ
+from twin.clouds.times import TIME_FIELDS, timed
 from twin.nodes.node_parameters import declare_config
 from twin.parameters import Derived, Flat
 
@@ -31,7 +32,7 @@ class LidarOdometryConfig:
     """Parameters; those that kiss-icp's node has are named as there."""
 
     topic: str = ""
-    """Of the clouds; empty: that of the robot's first lidar with layers."""
+    """Of the clouds; empty: that of the robot's first lidar that makes any."""
     lidar_odom_frame: str = "odom_lidar"
     """In which it tells poses: the base where the first cloud ended."""
     base_frame: Annotated[str, Derived] = "base_footprint"
@@ -73,9 +74,9 @@ class LidarOdometryNode:
             T_base_lidar = self._buffer.lookup(config.base_frame, message.header.frame_id)
         except TransformError:
             return
-        names = [field.name for field in message.fields]
-        points = read_points(message, [*XYZ, *(["time"] if "time" in names else [])])
+        times = [field.name for field in message.fields if field.name in TIME_FIELDS]
         stamp_ns = ns(message.header.stamp)
+        points = timed(read_points(message, [*XYZ, *times]), stamp_ns * 1e-9)
         found = self.odometry.register(points, T_base_lidar, stamp_ns * 1e-9)
         if (found is None) is not self._is_lost:
             self._is_lost = found is None

@@ -47,7 +47,7 @@ class RobotConfig(StrictModel):
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
     lidar_odometry: LidarOdometryParameters | None = None
-    """Odometry from the clouds of a lidar with layers; absent: none, `{}`: all defaults."""
+    """Odometry from the clouds of a lidar; absent: none, `{}`: all defaults."""
     localisation: Localisation | None = None
     """Who estimates its pose; absent: nobody."""
     navigation: NavigationConfig | None = None
