@@ -16,10 +16,15 @@ from twin.web.rosbridge.bridge import Bridge, BridgeConfig
 class Client:
     """A client of a bridge, without a socket."""
 
-    def __init__(self, world: World, role: str) -> None:
+    def __init__(self, world: World, role: str, known_as: str) -> None:
         self.frames: list[str | bytes] = []
         self.world = world
-        self.session = world.bridge.join("test", ROLES[role], lambda frame, topic: self.frames.append(frame))
+        self.session = world.bridge.join(
+            known_as or "test",
+            ROLES[role],
+            lambda frame, topic: self.frames.append(frame),
+            is_known=bool(known_as),
+        )
 
     def tell(self, op: str, **fields: Any) -> list[dict[str, Any]]:
         """Send a message, let the graph work, and return what came back."""
@@ -44,8 +49,8 @@ class World:
         config = BridgeConfig(audit=lambda line: self.lines.append(json.loads(line)))
         self.bridge = Bridge(bus, self.graph, config, lambda: self.now_s)
 
-    def client(self, role: str = "engineer") -> Client:
-        return Client(self, role)
+    def client(self, role: str = "engineer", known_as: str = "") -> Client:
+        return Client(self, role, known_as)
 
     def spin(self, seconds: float = 0.0) -> None:
         """Let time pass, and everybody work."""

@@ -201,6 +201,11 @@ def test_a_client_offers_a_service(world: World) -> None:
     (call,) = server.heard()
     server.tell("service_response", service="/lamp", id=call["id"], values="broken", result=False)
     assert none.error is not None
+    odd = world.bus.create_node("odd").create_client(SetBool, "/lamp").call_async(SetBool.Request(True))
+    world.spin()
+    (call,) = server.heard()
+    server.tell("service_response", service="/lamp", id=call["id"], values=values, result=False)
+    assert odd.result.message == "on"  # a response is one, as in rosbridge_suite
     later = world.bus.create_node("later").create_client(SetBool, "/lamp").call_async(SetBool.Request(True))
     world.spin()
     server.session.close()
@@ -326,7 +331,6 @@ def test_one_steers_at_a_time(world: World) -> None:
     assert not viewer.tell("call_service", service="/twin/control", args={"command": "take"})[0]["values"][
         "success"
     ]
-    one.tell("set_level", level="warning")
     (taken,) = other.tell(
         "call_service", service="/twin/control", args={"command": "take_over", "name": "Li"}
     )
@@ -445,6 +449,38 @@ def test_rules_of_a_file(world: World, tmp_path: Path) -> None:
         read_rules(file)
     for words in ("rules.yaml:1", "hear", "rules.yaml:2", "king", "rules.yaml:3"):
         assert words in str(fault.value)
+
+
+def test_whom_a_token_names_cannot_be_taken_for_somebody_else(world: World) -> None:
+    bob, anybody = world.client("operator", known_as="Bob"), world.client("operator")
+    take = {"service": "/twin/control", "args": {"command": "take_over", "name": "Mei"}}
+    assert anybody.tell("call_service", **take)[0]["values"]["holder"] == "Mei"
+    assert bob.tell("call_service", **take)[0]["values"]["holder"] == "Mei (Bob)"
+    assert "Mei (Bob) has taken control over" in anybody.heard()[-1]["msg"]
+    told = [(line["name"], line["called"]) for line in world.lines]
+    assert told == [(f"test #{anybody.session.number}", "Mei"), (f"Bob #{bob.session.number}", "Mei (Bob)")]
+
+
+@pytest.mark.parametrize("input_", ["guard/teleop", "cmd_vel_teleop"])
+@pytest.mark.parametrize("namespace", ["", "/red"])
+def test_an_operator_steers_by_the_way_that_is_for_people(world: World, namespace: str, input_: str) -> None:
+    operator, engineer = world.client("operator"), world.client()
+    move = {"msg": {"linear": {"x": 0.2}}}
+    driven = world.listen(Twist, f"{namespace}/cmd_vel")
+    engineer.tell("subscribe", topic=f"{namespace}/{input_}", type=TWIST)  # who only looks on is no way in
+    assert operator.tell("publish", topic=f"{namespace}/cmd_vel", **move) == []
+    by_hand = world.listen(Twist, f"{namespace}/{input_}")
+    told = errors(operator.tell("publish", topic=f"{namespace}/cmd_vel", **move))
+    assert told == [f"{namespace}/cmd_vel goes past {namespace}/{input_}: the role operator steers by that"]
+    assert (
+        "needs engineer" in errors(operator.tell("publish", topic=f"{namespace}/cmd_vel_smoothed", **move))[0]
+    )
+    assert len(driven) == 1
+    assert operator.tell("publish", topic=f"{namespace}/{input_}", **move) == []
+    assert len(by_hand) == 1
+    operator.tell("call_service", service="/twin/control", args={"command": "release"})
+    engineer.tell("publish", topic=f"{namespace}/cmd_vel", **move)  # it may everything
+    assert len(driven) == 2
 
 
 @pytest.mark.parametrize("role", ["viewer", "operator"])

@@ -11,6 +11,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,7 +23,7 @@ from websockets.server import ServerProtocol
 from websockets.sync.client import ClientConnection, connect
 
 from tests.processes import wait_for
-from tests.web.serving import serving
+from tests.web.serving import get, refused, serving
 from twin.bridge.bus import Bus
 from twin.bridge.clock import Clock
 from twin.bridge.live import LiveBus
@@ -95,6 +96,30 @@ def test_ten_wrong_tokens_lock_an_address_out(tokens: ServerConfig) -> None:
     assert [{key: line[key] for key in wrong} for line in audited] == [wrong] * 10
 
 
+def test_who_has_no_token_and_much_to_say_harms_nobody(tokens: ServerConfig) -> None:
+    with serving(tokens) as server:
+        for first in ({"op": "call_service", "service": "/rosapi/topics"}, {"op": "auth", "token": "wrong"}):
+            with connect(server.server.address) as client:
+                with contextlib.suppress(ConnectionClosed):
+                    for _ in range(20):
+                        client.send(json.dumps(first))
+                with pytest.raises(ConnectionClosed, match="1008"):
+                    client.recv(timeout=60.0)
+        with connect(f"{server.server.address}/?token={SECRETS[1]}") as client:
+            assert topics(client)["result"]
+
+
+@pytest.mark.parametrize("header", ["Host", "Origin", "Authorization"])
+def test_a_header_that_is_there_twice_is_refused(header: str) -> None:
+    with serving(ServerConfig(port=0)) as server:
+        _, _, host = server.server.address.partition("//")
+        with socket.create_connection(tuple(host.rsplit(":", 1)), timeout=60.0) as client:  # type: ignore[arg-type]
+            lines = {"Host": f"Host: {host}", "Origin": "", "Authorization": ""}
+            said = "\r\n".join(["GET / HTTP/1.1", *filter(None, lines.values()), *[f"{header}: {host}"] * 2])
+            client.sendall(f"{said}\r\n\r\n".encode())
+            assert client.recv(1000).startswith(b"HTTP/1.1 400 ")
+
+
 def test_more_than_this_computer_needs_a_token() -> None:
     with pytest.raises(BridgeError, match="--token"):
         ServerConfig(address="0.0.0.0")
@@ -157,6 +182,25 @@ def test_files_for_browsers(tmp_path: Path) -> None:
         for path in ("/none", "/../secret", "/%2e%2e/secret", "/.hidden", "/link", "//etc/passwd", "/a%00b"):
             with pytest.raises(urllib.error.HTTPError, match="404"):
                 urllib.request.urlopen(address + path, timeout=60.0)
+
+
+def test_meshes_of_packages(tmp_path: Path, tokens: ServerConfig) -> None:
+    package = tmp_path / "arm_description"
+    (package / "meshes").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>arm_description</name></package>")
+    (package / "meshes" / "arm 1.stl").write_bytes(b"solid")
+    (package / "secret.txt").write_text("no")
+    with serving(replace(tokens, packages=package)) as server:
+        known = f"?token={SECRETS[0]}"
+        assert refused(server, "/meshes/arm_description/meshes/arm%201.stl")[0] == 401
+        with get(server, f"/meshes/arm_description/meshes/arm%201.stl{known}") as answer:
+            assert (answer.read(), answer.headers["Content-Type"]) == (b"solid", "model/stl")
+        for path in ("arm_description/secret.txt", "arm_description/../secret.stl", "nobody/a.stl", ""):
+            assert refused(server, f"/meshes/{path}{known}")[0] == 404
+    with serving(ServerConfig(port=0)) as server:
+        assert refused(server, "/meshes/arm_description/meshes/arm%201.stl") == (
+            404, "this server gives no meshes\n",
+        )  # fmt: skip
 
 
 def test_too_large_too_often_too_many() -> None:

@@ -29,6 +29,10 @@ from tests.processes import free_endpoint, wait_for, wait_for_listener
 
 ROOT = Path(__file__).parents[2]
 CLIENTS = Path(__file__).parent / "clients"
+ROSLIBPY = (
+    "tests/ros2", "tests/test_transport.py",
+    *(f"tests/ros1/test_{name}.py" for name in ("core", "ros", "rosapi", "service", "tf", "topic")),
+)  # fmt: skip
 
 
 def folder(variable: str) -> Path:
@@ -68,13 +72,14 @@ def graph(port: int, audit: Path) -> Iterator[str]:
 @pytest.mark.long
 @pytest.mark.parametrize("transport", ["twisted", "asyncio"])
 def test_roslibpys_own_tests(transport: str, tmp_path: Path) -> None:
+    """Those for ROS 2, and of those for ROS 1 what ROS 2 has: no parameters without a node, no actionlib."""
     home = folder("TWIN_ROSLIBPY")
     with socket.socket() as probe:
         if probe.connect_ex(("127.0.0.1", 9090)) == 0:
             pytest.skip("somebody else listens on port 9090, which roslibpy's tests name")
     with graph(9090, tmp_path / "audit.jsonl"):
         done = subprocess.run(
-            [home / "venv/bin/python", "-m", "pytest", "-q", "tests/ros2", "tests/test_transport.py"],
+            [home / "venv/bin/python", "-m", "pytest", "-q", *ROSLIBPY],
             cwd=home,
             env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
             | {"ROSLIBPY_TRANSPORT": transport},

@@ -60,6 +60,13 @@ def test_a_header_without_a_time_gets_one(given: object) -> None:
     assert message.header.stamp == (stamp(7_000_000_005) if given is not None else stamp(0))
 
 
+def test_what_clients_for_ros_1_count_in_a_header_is_passed_over() -> None:
+    values = {"header": {"seq": 7, "frame_id": "base"}, "point": {"x": 1.0}}
+    assert to_message(PointStamped, values, 0).header.frame_id == "base"
+    with pytest.raises(BridgeError, match="no field 'seq'"):
+        to_message(PointStamped, {"seq": 7}, 0)
+
+
 def test_a_time_may_be_spelled_as_in_ros_1() -> None:
     message = to_message(Header, {"stamp": {"secs": 3, "nsecs": 4}, "frame_id": "map"}, 0)
     assert message == Header(stamp(3_000_000_004), "map")

@@ -20,7 +20,7 @@ from twin.bridge.msgs import Header, String, header
 from twin.bridge.node import Node
 from twin.bridge.qos import LATCHED
 from twin.bridge.srvs import SetBool
-from twin.web.foxglove.assets import Assets
+from twin.web.assets import Assets
 
 LONG_S = 60.0
 

@@ -114,7 +114,7 @@ class Joining:
         return replace(self, use_sim_time=False, interfaces=None)
 
     @contextmanager
-    def open(self, patience_s: float = _AT_ONCE_S) -> Iterator[LiveBus]:
+    def open(self, patience_s: float = _AT_ONCE_S, *, quietly: bool = False) -> Iterator[LiveBus]:
         """Join; raises BridgeError if nobody is there in this time [s], and says what it waits for."""
         from twin.bridge import live
         from twin.errors import NobodyAnswersError
@@ -135,7 +135,8 @@ class Joining:
             except NobodyAnswersError as fault:
                 if patience_s <= _AT_ONCE_S:
                     raise
-                typer.echo(f"waiting: {fault}", err=True)
+                if not quietly:
+                    typer.echo(f"waiting: {fault}", err=True)
                 process = ending.enter_context(join(patience_s - _AT_ONCE_S))
             yield process
 

@@ -109,6 +109,7 @@ def rosbridge(
         certificate=certificate,
         key=key,
         folders={"": PAGE},
+        packages=Path.cwd(),
     )
     bridging = BridgeConfig(
         Limits(message_bytes=max_message, messages_per_s=max_rate, clients=max_clients),
@@ -124,7 +125,7 @@ def rosbridge(
             for notice in read.notices:
                 typer.echo(notice, err=True)
         else:
-            process = stack.enter_context(joining.open(PATIENCE_S))
+            process = stack.enter_context(joining.open(PATIENCE_S, quietly=parent > 0))
         received = stack.enter_context(noted_signals())
         stack.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(_SWITCH_S)

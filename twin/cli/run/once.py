@@ -97,7 +97,7 @@ def _web(options: RunOptions) -> AbstractContextManager[None]:
         return nullcontext()
     from twin.cli.run.web import rosbridge_beside
 
-    return rosbridge_beside(options.joining, options.web_port, options.out or Path("runs"))
+    return rosbridge_beside(options.joining, options.serving, options.out or Path("runs"))
 
 
 def _golden(path: Path) -> Side:

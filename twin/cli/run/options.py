@@ -63,6 +63,18 @@ class RunOptions:
         _others("--web", help="Serve web clients and the operator's page: `twin rosbridge` beside the run."),
     ] = False
     web_port: Annotated[int, _others(min=0, max=65535, help="Where they connect.")] = 9090
+    web_address: Annotated[
+        str, _others(metavar="IP", help="Of this computer; another than loopback needs --web-token.")
+    ] = "127.0.0.1"
+    web_token: Annotated[
+        Path | None,
+        _others(
+            metavar="FILE",
+            exists=True,
+            dir_okay=False,
+            help="Which of them may come in, see `twin rosbridge`.",
+        ),
+    ] = None
     listen: Annotated[
         list[str] | None,
         _others(metavar="ENDPOINT", help="Let others join the bus, e.g. tcp/127.0.0.1:7447."),
@@ -125,7 +137,21 @@ class RunOptions:
             raise typer.BadParameter(
                 "--web is of one run at its own pace: no --repeat, --wait-for and the like"
             )
+        if self.web:
+            self._check_web()
         _ = self.overrides, self.speed  # raise ScenarioError
+
+    def _check_web(self) -> None:
+        """Refuse before the run what `twin rosbridge` would refuse beside it."""
+        from twin.web.rosbridge.access import read_tokens
+        from twin.web.rosbridge.door import is_loopback
+
+        if self.web_token:
+            read_tokens(self.web_token)
+        elif not is_loopback(self.web_address):
+            raise typer.BadParameter(
+                f"--web-address {self.web_address}: others may come in only with --web-token FILE"
+            )
 
     @property
     def overrides(self) -> dict[str, str]:
@@ -181,6 +207,12 @@ class RunOptions:
         from twin.cli.run.web import free_endpoint
 
         return next(iter(self.listen or self.connect or ()), "") or free_endpoint()
+
+    @property
+    def serving(self) -> list[str]:
+        """The options by which `twin rosbridge` serves web clients of the run."""
+        words = ["--port", str(self.web_port), "--address", self.web_address]
+        return [*words, "--token", str(self.web_token)] if self.web_token else words
 
     @property
     def joining(self) -> list[str]:

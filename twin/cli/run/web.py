@@ -22,16 +22,16 @@ def free_endpoint() -> str:
 
 
 @contextmanager
-def rosbridge_beside(joining: Sequence[str], port: int, folder: Path) -> Iterator[None]:
+def rosbridge_beside(joining: Sequence[str], serving: Sequence[str], folder: Path) -> Iterator[None]:
     """Run `twin rosbridge` while a block runs; it tells its address on stderr, and lives by `/clock`.
 
     Args:
         joining: Options by which it finds the run.
-        port: Where clients connect.
+        serving: Options of where clients connect, and who may.
         folder: For `rosbridge.jsonl`, the audit of their commands.
     """
     audit = folder / "rosbridge.jsonl"
-    words = ["rosbridge", *joining, "--use-sim-time", "--port", str(port), "--audit", str(audit)]
+    words = ["rosbridge", *joining, "--use-sim-time", *serving, "--audit", str(audit)]
     command = [sys.executable, "-m", "twin.cli", *words, "--parent", str(os.getpid())]
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr) as child:
         try:

@@ -17,7 +17,7 @@ from twin.bridge.qos import QoS
 from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.bridge.topics.raw_publisher import RawPublisher
 from twin.errors import BridgeError
-from twin.web.foxglove.assets import Assets
+from twin.web.assets import Assets
 from twin.web.foxglove.errands import Errands
 from twin.web.foxglove.parameters import RemoteParameters
 

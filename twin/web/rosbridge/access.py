@@ -38,7 +38,8 @@ _OPERATING = (
     "*/pause", "*/resume", "*/_action/cancel_goal", "*/acknowledge*", *_TASKS, *_SIMULATION,
 )  # fmt: skip
 _TALKING = (
-    "*/cmd_vel*", "*/teleop", "*/initialpose", "*/goal_pose", "*/clicked_point", "*/joy", "*/waypoints",
+    "*/cmd_vel", "*/cmd_vel_teleop", "*/cmd_vel_key", "*/cmd_vel_joy", "*/teleop",
+    "*/initialpose", "*/goal_pose", "*/clicked_point", "*/joy", "*/waypoints",
     "*/guard/stop", "*/guard/release", "*/keepout*", "*/speed_limit",
 )  # fmt: skip
 
@@ -46,6 +47,8 @@ STOPS = ("*/guard/stop", "*/emergency_stop", "*/e_stop", "*/estop")
 """Names by which a robot is stopped: such a command overtakes all others and needs no control."""
 READING_ACTIONS = ("/tf2_web_republisher",)
 """Actions that only tell something: their goals need no control, and end with the client that sent them."""
+BY_HAND = ("guard/teleop", "cmd_vel_teleop")
+"""Where a guard and a multiplexer take commands of people; whose robot has one does not steer past it."""
 STEERING_TYPES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 """Velocities: who sends them steers, and stops if it falls silent."""
 STEERING_TOPICS = (

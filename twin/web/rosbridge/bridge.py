@@ -11,7 +11,7 @@ from typing import Any
 from twin.bridge.bags.reader import BagReader
 from twin.bridge.bus import Bus
 from twin.bridge.graph import Graph
-from twin.web.rosbridge.access import ROLES, Role
+from twin.web.rosbridge.access import BY_HAND, EVERYTHING, ROLES, RefusedError, Role
 from twin.web.rosbridge.calls import Calls
 from twin.web.rosbridge.control import Control, ControlConfig
 from twin.web.rosbridge.frames import Frame
@@ -78,7 +78,7 @@ class Bridge:
         self.control = Control(self.node, config.control, now_s, self.topics.say)
         self.rosapi = Rosapi(bus, graph, now_s)
         self.transforms = TfRepublisher(bus, now_s)
-        self._learner, self._audit = learner, config.audit
+        self._graph, self._learner, self._audit = graph, learner, config.audit
         self._count = 0
         self._sessions: set[Session] = set()
 
@@ -90,10 +90,12 @@ class Bridge:
             self._history is not None and self._history.is_waiting
         )
 
-    def join(self, name: str, role: Role, send: Callable[[Frame, str | None], None]) -> Session:
-        """Return the session of a new client."""
+    def join(
+        self, name: str, role: Role, send: Callable[[Frame, str | None], None], *, is_known: bool = False
+    ) -> Session:
+        """Return the session of a new client, whose name a token may tell."""
         self._count += 1
-        session = Session(self, self._count, f"{name} #{self._count}", role, send)
+        session = Session(self, self._count, name, role, send, is_known=is_known)
         self._sessions.add(session)
         return session
 
@@ -126,9 +128,24 @@ class Bridge:
         viewer = ROLES["viewer"]
         return viewer.allows("service", service)
 
+    def check_way(self, role: Role, topic: str) -> None:
+        """Refuse a velocity that goes past a guard or a multiplexer, unless a role may publish everything.
+
+        Raises:
+            RefusedError: says where it belongs.
+        """
+        if role.topics == EVERYTHING or topic.endswith(tuple(f"/{name}" for name in BY_HAND)):
+            return
+        own = self.node.fully_qualified_name
+        for name in (f"{topic.rpartition('/')[0]}/{name}" for name in BY_HAND):
+            if any(each.node.full_name != own for each in self._graph.subscriptions(name)):
+                raise RefusedError(f"{topic} goes past {name}: the role {role.name} steers by that")
+
     def audit(self, session: Session, op: str, name: str, values: Any) -> None:
         """Write a command down."""
-        who = {"client": session.number, "name": session.name, "role": session.role.name}
+        who = {"client": session.number, "name": session.identity, "role": session.role.name}
+        if session.name != session.identity:
+            who["called"] = session.name
         text = json.dumps(values, default=str)
         self._write({**who, "op": op, "target": name}, json.loads(text) if len(text) <= 2000 else text[:2000])
 

@@ -136,7 +136,9 @@ class Calls:
         self._withdraw(service)
 
     def respond(self, session: Session, name: str, key: str, values: Any, result: bool) -> None:
-        """Give a client's response to who has asked; one without result tells them that there is none.
+        """Give a client's response to who has asked; a mere sentence tells them that there is none.
+
+        A response is one whatever its `result`, as in rosbridge_suite: ROS 2 knows no failure of services.
 
         Raises:
             BridgeError: nobody waits for it, or values that its fields cannot hold.
@@ -145,7 +147,8 @@ class Calls:
         offered = self._offered.get(service)
         if offered is None or offered.session is not session or key not in offered.waiting:
             raise BridgeError(f"nobody waits for the response {key!r} of {service}")
-        response = to_message(offered.type.Response, values, self._node.now_ns) if result else None
+        is_one = result or isinstance(values, dict)
+        response = to_message(offered.type.Response, values, self._node.now_ns) if is_one else None
         offered.waiting.pop(key)(response)
 
     def leave(self, session: Session) -> None:

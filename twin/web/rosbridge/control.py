@@ -74,7 +74,7 @@ class Control:
             return True, self._words
         if not session.role.topics:
             return False, f"the role {session.role.name} watches, and may not steer"
-        session.name = name[:_LONGEST_NAME] or session.name
+        session.call(name[:_LONGEST_NAME])
         if command == "release":
             if self.holder is session:
                 self._give(None, "")
@@ -84,7 +84,8 @@ class Control:
             return False, self._words
         if other is not None:
             self._halt(other)
-            other.status("warning", f"{session.name} has taken control over")
+            # Its commands are refused from now on, which is an error to it: warnings are off by default.
+            other.status("error", f"{session.name} has taken control over")
         self._give(session, other.name if other is not None else self.taken_from if self.holder else "")
         return True, self._words
 

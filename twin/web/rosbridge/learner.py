@@ -70,10 +70,21 @@ class Learner:
         return True
 
 
+_ROS_1 = {
+    "tf2_web_republisher/": "tf2_web_republisher_interfaces/",
+    "rospy_tutorials/AddTwoInts": "example_interfaces/AddTwoInts",
+}
+"""What types of ROS 1 that clients still ask for are called today; the fields are the same."""
+
+
 def type_name(given: str, kind: str) -> str:
     """Return package/kind/Name, also for ROS 1's package/Name.
 
     Raises:
         BridgeError: no name of a type.
     """
-    return types.full_name(given.replace("/", f"/{kind}/") if given.count("/") == 1 else given)
+    if given.count("/") != 1:
+        return types.full_name(given)
+    for old, new in _ROS_1.items():
+        given = new + given.removeprefix(old) if given.startswith(old) else given
+    return types.full_name(given.replace("/", f"/{kind}/"))

@@ -72,5 +72,10 @@ def page_of(folders: Mapping[str, Path], path: str) -> Page:
         body = file.read_bytes()
     except OSError:
         return NOT_FOUND
-    kind = _TYPES.get(file.suffix) or mimetypes.guess_type(file.name)[0] or "application/octet-stream"
-    return Page(200, f"{kind}; charset=utf-8" if kind.startswith("text/") else kind, body)
+    return Page(200, content_type(file.name), body)
+
+
+def content_type(name: str) -> str:
+    """Return what browsers take a file of this name for."""
+    kind = _TYPES.get(Path(name).suffix) or mimetypes.guess_type(name)[0] or "application/octet-stream"
+    return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind

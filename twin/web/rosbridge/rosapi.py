@@ -90,6 +90,7 @@ class Rosapi:
             "interfaces": ("Interfaces", lambda r: {"interfaces": sorted(types.names())}),
             "action_servers": ("GetActionServers", lambda r: {"action_servers": self._action_servers()}),
             "action_type": ("ActionType", lambda r: {"type": _first(graph.actions(), r.action)}),
+            "get_ros_version": ("GetROSVersion", lambda r: {"version": 2, "distro": "jazzy"}),
             "get_time": ("GetTime", lambda r: {"time": stamp(self.node.now_ns)}),
             "delete_param": (
                 "DeleteParam",

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
+_ONCE = (
+    "Host", "Origin", "Upgrade", "Authorization", "Referer", "Sec-Fetch-Site", "If-None-Match",
+)  # fmt: skip
+"""Headers of which nobody knows which one is meant if there are two."""
 _AUTH_S = 5.0
 """How long a client may take to tell its token [s]."""
 _MOST_PENDING = 200
@@ -55,6 +59,8 @@ class ServerConfig:
     key: Path | None = None
     folders: Mapping[str, Path] = field(default_factory=dict)
     """Files for browsers, see `page_of`."""
+    packages: Path | None = None
+    """A folder: ROS packages around it, and those of the environment, give their meshes. None: none does."""
 
     def __post_init__(self) -> None:
         """Refuse to be open to all."""
@@ -171,7 +177,9 @@ class Server:
         connection = event.connection
         if connection.session is None:
             assert connection.role is not None
-            connection.session = bridge.join(connection.name, connection.role, connection.send)
+            connection.session = bridge.join(
+                connection.name, connection.role, connection.send, is_known=bool(self._config.tokens)
+            )
         if event.message is None:
             connection.session.close()
             return
@@ -222,6 +230,9 @@ class Server:
             self._http.close()
 
     async def _on_request(self, websocket: ServerConnection, request: Request) -> Response | None:
+        for name in _ONCE:
+            if len(request.headers.get_all(name)) > 1:
+                return response(refusal(400, f"more than one {name}"))
         if not self._door.is_own_name(request.headers.get("Host", "")):
             return response(refusal(403, "this server has another name"))
         if request.headers.get("Upgrade", "").lower() != "websocket":
@@ -259,7 +270,8 @@ class Server:
         try:
             if connection.role is None:
                 async with asyncio.timeout(_AUTH_S):
-                    await self._authenticate(websocket, connection, peer)
+                    if not await self._is_authentic(websocket, connection, peer):
+                        return  # what it has sent since then may be here already
             async for text in websocket:
                 self._take(connection, text)
         except (ConnectionClosed, TimeoutError):
@@ -272,19 +284,19 @@ class Server:
                 self._stops.append(_Event(connection, None))
                 self._wake()
 
-    async def _authenticate(self, websocket: ServerConnection, connection: Connection, peer: str) -> None:
-        """Wait for the token; raises TimeoutError, ConnectionClosed."""
-        while connection.role is None:
-            try:
-                message = from_json(await websocket.recv())
-            except BridgeError:
-                message = {}
-            secret = message.get("token") if message.get("op") == "auth" else None
-            token = self._door.checked(peer, secret) if isinstance(secret, str) else None
-            if token is None:
-                await websocket.close(1008, "the first message is auth, with a token that is known")
-                return
-            connection.role, connection.name = token.role, token.name
+    async def _is_authentic(self, websocket: ServerConnection, connection: Connection, peer: str) -> bool:
+        """Wait for the token, and close without one; raises TimeoutError, ConnectionClosed."""
+        try:
+            message = from_json(await websocket.recv())
+        except BridgeError:
+            message = {}
+        secret = message.get("token") if message.get("op") == "auth" else None
+        token = self._door.checked(peer, secret) if isinstance(secret, str) else None
+        if token is None:
+            await websocket.close(1008, "the first message is auth, with a token that is known")
+            return False
+        connection.role, connection.name = token.role, token.name
+        return True
 
     def _take(self, connection: Connection, text: str | bytes) -> None:
         """Queue what a client says; a stop overtakes all else, and is never too much."""

@@ -36,12 +36,22 @@ class Session:
     """A client: its messages come in by `handle`, what it is told goes out by `send`."""
 
     def __init__(
-        self, bridge: Bridge, number: int, name: str, role: Role, send: Callable[[Frame, str | None], None]
+        self,
+        bridge: Bridge,
+        number: int,
+        name: str,
+        role: Role,
+        send: Callable[[Frame, str | None], None],
+        *,
+        is_known: bool = False,
     ):
         self.number = number
         """Unique in the bridge."""
-        self.name = name
-        """Who it is, for people and the audit."""
+        self.identity = f"{name} #{number}"
+        """Who it is: the token's name, or an address; for the audit."""
+        self.name = self.identity
+        """What it is called, for people."""
+        self._known = name if is_known else ""
         self.role = role
         self.send = send
         """Takes a frame, and the topic that it is of: of a topic newer ones may take its place."""
@@ -84,6 +94,11 @@ class Session:
             if isinstance(error, RefusedError):
                 self._audit_refused(message, str(error))
             self.status("error", str(error), key if isinstance(key, str) else None)
+
+    def call(self, name: str) -> None:
+        """Take the name that somebody gives himself; whom a token names stays known by that, too."""
+        if name:
+            self.name = f"{name} ({self._known})" if self._known and name != self._known else name
 
     def status(self, level: str, text: str, key: str | None = None) -> None:
         """Tell the client what it wants to know of this level."""
@@ -134,6 +149,8 @@ class Session:
         self.role.check("topic", topic)
         steers = bridge.topics.type_of(topic) in STEERING_TYPES
         is_command = steers or matches(topic, STEERING_TOPICS)
+        if steers:
+            bridge.check_way(self.role, topic)
         if is_command and not matches(topic, STOPS):
             bridge.control.command(self)
         published = bridge.topics.publish(

@@ -111,6 +111,8 @@ def _prepared(typename: str, values: Any, path: str, now_ns: int, is_finite: boo
         values = {{"secs": "sec", "nsecs": "nanosec"}.get(name, name): it for name, it in values.items()}
     fields = {field.name: field for field in fields_of(typename)}
     made: dict[str, Any] = {}
+    if typename == _HEADER:  # clients for ROS 1 count their messages
+        values = {name: it for name, it in values.items() if name != "seq"}
     for name, value in values.items():
         field = fields.get(name)
         if field is None:

@@ -42,7 +42,9 @@ export function Scene({ station, label }) {
         if (!robot.urdf) continue;
         if (bodies.get(robot)?.urdf !== robot.urdf) {
           if (bodies.has(robot)) scene.remove(bodies.get(robot).body);
-          const loader = new URDFLoader();
+          const files = new THREE.LoadingManager();
+          files.setURLModifier((url) => (url.startsWith("meshes/") ? station.address(url, {}) : url));
+          const loader = new URDFLoader(files);
           loader.packages = (name) => `meshes/${name}`;
           const body = loader.parse(robot.urdf);
           scene.add(body);

@@ -7,9 +7,10 @@ import re
 from collections.abc import Callable
 from http import HTTPStatus
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
 from twin.errors import BridgeError
+from twin.web.assets import Assets
 from twin.web.rosbridge.access import Role
 from twin.web.rosbridge.bridge import Limits
 from twin.web.rosbridge.door import Door, given_token, peer_of
@@ -18,7 +19,7 @@ from twin.web.rosbridge.http.cameras import Camera, EndedError
 from twin.web.rosbridge.http.jpeg import NoPictureError, Wish
 from twin.web.rosbridge.http.look import Ask, NoTopicError
 from twin.web.rosbridge.http.maps import Maps
-from twin.web.rosbridge.pages import Page, policy_of, refusal
+from twin.web.rosbridge.pages import Page, content_type, policy_of, refusal
 from twin.web.rosbridge.rates import Bucket
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from twin.web.rosbridge.server import ServerConfig
 
-_STREAM, _SNAPSHOT, _TILES = "/stream", "/snapshot", "/tiles.json"
+_STREAM, _SNAPSHOT, _TILES, _MESHES = "/stream", "/snapshot", "/tiles.json", "/meshes/"
 _TILE = re.compile(r"/tiles/(\d{1,2})/(\d{1,6})/(\d{1,6})\.png")
 _VERSION = re.compile(r"\d{1,18}")
 _KINDS = ("mjpeg", "ros_compressed")
@@ -50,11 +51,14 @@ class Http:
         """Return the answer to a GET; None: it is not for what is served here."""
         url = urlsplit(request.path)
         tile = _TILE.fullmatch(url.path)
-        if url.path not in (_STREAM, _SNAPSHOT, _TILES) and tile is None:
+        is_mesh = url.path.startswith(_MESHES)
+        if url.path not in (_STREAM, _SNAPSHOT, _TILES) and tile is None and not is_mesh:
             return None
         role = self._role(connection, request)
         if isinstance(role, Page):
             return role
+        if is_mesh:
+            return await self._mesh(unquote(url.path.removeprefix(_MESHES)))
         query = dict(parse_qsl(url.query, keep_blank_values=True))
         topic = f"/{query.get('topic', '').strip('/')}"
         kind = query.get("type", _KINDS[0])
@@ -103,6 +107,15 @@ class Http:
         given = given_token(request)
         token = None if given is None else self._door.checked(peer, given)
         return refusal(401, "a token is needed, one that is known") if token is None else token.role
+
+    async def _mesh(self, path: str) -> Page:
+        """Return a file of a ROS package: PACKAGE/PATH, as `package://` has it."""
+        if self._config.packages is None:
+            return refusal(404, "this server gives no meshes")
+        content = await asyncio.to_thread(Assets(self._config.packages).read, f"package://{path}")
+        if content is None:
+            return refusal(404, f"no mesh or picture is known as package://{path[:200]}")
+        return Page(200, content_type(path), content)
 
     async def _described(self, topic: str, since: str | None) -> Page:
         tiles = await self._maps.tiles(topic, self._limits.stalled_s)
