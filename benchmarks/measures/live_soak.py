@@ -111,7 +111,8 @@ def soak(minutes: float) -> None:
 
         mirror.advance(tick)
     robot.kill()
-    begins = [at_s - (EARLY_S if at_s > ROUND_S else early_s) for at_s, _ in done] + [minutes * 60.0]
+    earlier_s = [(EARLY_S if at_s > ROUND_S else early_s) * (what == "kidnapped") for at_s, what in done]
+    begins = [at_s - early_s for (at_s, _), early_s in zip(done, earlier_s, strict=True)] + [minutes * 60.0]
     for (at_s, what), since_s, until_s in zip(done, begins, begins[1:], strict=False):
         words = [text for told_s, text in told if since_s <= told_s < until_s]
         print(f"{at_s:7.1f} s  {what:10} {'; '.join(dict.fromkeys(words)) or 'NOTHING TOLD'}"[:MOST])
