@@ -302,7 +302,20 @@ def test_a_camera_faster_than_the_physics_is_refused(camera_at: Look) -> None:
         camera_at(rate=600)
 
 
-def test_another_process_sees_the_same_with_egl_as_with_osmesa(camera_at: Look) -> None:
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"MUJOCO_GL": "osmesa" if find_library("OSMesa") else "egl"},
+        pytest.param(
+            {"__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"},
+            marks=pytest.mark.skipif(not find_library("OSMesa"), reason="OSMesa is not installed"),
+        ),
+    ],
+    ids=["asked for", "as EGL has no driver"],
+)
+def test_another_process_sees_the_same_with_egl_as_with_osmesa(
+    camera_at: Look, asked: dict[str, str]
+) -> None:
     """OSMesa is taken where it is installed: without it MuJoCo does not start if it is asked for."""
     view = camera_at(BALL, inside=NOISE).look(0, depth=True)
     assert view.colours is not None
@@ -318,7 +331,7 @@ def test_another_process_sees_the_same_with_egl_as_with_osmesa(camera_at: Look) 
         [sys.executable, "-c", code],
         env={
             **inherited,
-            "MUJOCO_GL": "osmesa" if find_library("OSMesa") else "egl",
+            **asked,
             "PYTHONPATH": str(Path(__file__).parents[3]),
         },
         capture_output=True,
