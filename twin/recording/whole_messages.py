@@ -10,6 +10,8 @@ _START = 12
 """Bytes before the first message: who wrote it, and how."""
 _HEADER = struct.Struct("<QQ")
 """Of a message: its kind, and how many bytes follow (re_log_encoding, `MessageHeader`)."""
+_END = 0
+"""Kind of the last message of a recording that has an index."""
 
 
 def whole_bytes(path: Path, most: int | None = None) -> int:
@@ -28,11 +30,23 @@ def whole_bytes(path: Path, most: int | None = None) -> int:
     with path.open("rb") as file:
         place = _START
         while len(header := _seen(file, place)) == _HEADER.size:
-            place += _HEADER.size + _HEADER.unpack(header)[1]
+            kind, length = _HEADER.unpack(header)
+            place += _HEADER.size + length
             if place > most:
                 break
             end = place
+            if kind == _END:
+                return size  # an index of chunks follows, which is no message
     return end
+
+
+def is_cut(path: Path) -> bool:
+    """Tell whether a recording ends within a message.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    return whole_bytes(path) < path.stat().st_size
 
 
 def cut_off(path: Path, spare: int) -> None:

@@ -161,7 +161,7 @@ def _note(name: str) -> None:
 
 
 def _forget(modules: set[str], platform: str | None) -> None:
-    """Let PyOpenGL be set to another library: it is set when it is imported, and says so to who comes next."""
+    """Let PyOpenGL be set to another library, which it is when it is imported."""
     for name in set(sys.modules) - modules:
         if name.partition(".")[0] == "OpenGL" or name.startswith("mujoco."):
             del sys.modules[name]
