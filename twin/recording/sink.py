@@ -153,6 +153,7 @@ class RerunSink:
         wheels: Mapping[str, Collection[str]] = NO_WHEELS,
         cameras: Mapping[str, Mounted] = NO_CAMERAS,
         depths: Collection[str] = (),
+        truths: Collection[str] = (),
     ) -> None:
         """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
 
@@ -161,6 +162,7 @@ class RerunSink:
             wheels: By robot: joints that turn without end, which are not plotted.
             cameras: By topic: what makes the pictures there.
             depths: Topics of depth images that cameras make.
+            truths: Topics of labels in colours, and of boxes, that cameras of ground truth make.
 
         Raises:
             RecordingError: The file cannot be written, or the screen is not there.
@@ -178,8 +180,8 @@ class RerunSink:
         frames = Frames(world.body_names)
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
         self._stage: Stage = Stage(world, shapes, self._robots)
-        shown = [*map(picture_entity, cameras), *map(depth_entity, depths)]
-        self._depths = frozenset(depths)
+        shown = [*map(picture_entity, [*cameras, *truths]), *map(depth_entity, depths)]
+        self._depths, self._truths = frozenset(depths), frozenset(truths)
         blueprint = layout(
             self._stage, self._robots, mirrors=self.mirrors, pictures=shown if self._images_period else ()
         )
@@ -212,6 +214,7 @@ class RerunSink:
             radii={box.robot: box.radius for box in self._robots},
             wheels=wheels,
             cameras=cameras,
+            truths=self._truths,
             images_period=self._images_period,
             images=self._config.images,
         )
@@ -243,11 +246,11 @@ class RerunSink:
         return msgtype in SHOWN_TYPES
 
     def wants(self, publisher: Publisher[Any]) -> bool:
-        """Return whether it shows a cloud, or a picture or depths that are due (for `Bus.wishes`)."""
+        """Return whether it shows a cloud, or a picture, depths or labels that are due (for `Bus.wishes`)."""
         if publisher.msgtype == _CLOUD:  # a camera shows its own as a picture
             topics = (each for each in publisher.node.endpoints if isinstance(each, type(publisher)))
             return not self._closed and not any(map(_is_picture, topics))
-        if not _is_picture(publisher) and publisher.name not in self._depths:
+        if not _is_picture(publisher) and publisher.name not in self._depths | self._truths:
             return False
         if self._images_period is None or self._closed:
             return False
@@ -309,6 +312,7 @@ class RerunSink:
         from twin.recording.channels.images import DepthChannel
         from twin.recording.channels.pictures import PictureChannel
         from twin.recording.channels.series import JointChannel
+        from twin.recording.channels.truth import LabelChannel, TrueBoxChannel
         from twin.recording.stream import handed_over, log_verdict
 
         if verdict is not None:
@@ -316,7 +320,12 @@ class RerunSink:
         self._stage.fit()
         self._set_stage()
         # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-        cameras = [source for source in self._sources if isinstance(source, PictureChannel)]
+        cameras = [
+            source
+            for source in self._sources
+            if isinstance(source, PictureChannel | LabelChannel)
+            or (isinstance(source, TrueBoxChannel) and source.is_alone)
+        ]
         shown = [source.entity for source in cameras]
         depths = (source for source in self._sources if isinstance(source, DepthChannel))
         shown += [source.entity for source in depths if source.has_images]

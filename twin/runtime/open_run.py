@@ -194,7 +194,7 @@ class OpenRun:
             if self._sink is not None:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
-                self._sink.declare(parts.world, wheels, _cameras(parts), _depths(parts))
+                self._sink.declare(parts.world, wheels, _cameras(parts), _depths(parts), _truths(parts))
             self._pace: Pace | None = None
             if pace is not None:
                 self._keep(Pace(pace) if isinstance(pace, int | float) else pace)
@@ -517,6 +517,12 @@ def _recording(
 def _depths(parts: Parts) -> list[str]:
     """Return the topics of depth images."""
     return [camera.depths for stack in parts.stacks.values() for camera in stack.cameras if camera.depths]
+
+
+def _truths(parts: Parts) -> list[str]:
+    """Return the topics of labels in colours, and of boxes, that are ground truth."""
+    cameras = (camera for stack in parts.stacks.values() for camera in stack.cameras)
+    return [topic for camera in cameras for topic in camera.truths]
 
 
 def _cameras(parts: Parts) -> dict[str, Mounted]:
