@@ -7,11 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rerun as rr
+import rerun.blueprint as rrb
 from PIL import Image
 
 from twin.errors import RecordingError
 from twin.recording import player
+from twin.recording.read_back import WATCH, shown_time_s
 from twin.recording.sink import RerunSink
+from twin.recording.stream import end_recording, open_recording
+from twin.recording.whole_messages import is_cut, whole_bytes
 
 needs_vulkan = pytest.mark.skipif(
     not player.has_vulkan(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"
@@ -76,6 +81,50 @@ def _is_drawn(client: Any, view_id: str) -> bool:
         return bool(client.take_screenshot(view_id))
     except ConnectionError:  # another tab is before it
         return False
+
+
+def test_what_is_cut_within_a_message_is_told_and_not_waited_for(recorded: Any, tmp_path: Path) -> None:
+    whole = recorded.path.read_bytes()
+    for cut, size in ((True, len(whole) - 1000), (True, whole_bytes(recorded.path) + 7), (False, len(whole))):
+        (tmp_path / "a.rrd").write_bytes((whole + bytes(7))[:size])
+        assert is_cut(tmp_path / "a.rrd") == cut
+        if cut:
+            with pytest.raises(
+                RecordingError, match=r"a\.rrd: the recording is damaged: it ends within a mes"
+            ):
+                player.screenshot(tmp_path / "a.rrd", tmp_path / "a.png", time_s=1.0)
+
+
+def test_an_index_of_chunks_is_no_cut(tmp_path: Path) -> None:
+    with rr.RecordingStream("twin") as recording:
+        recording.save(tmp_path / "a.rrd")
+        recording.log("/x", rr.TextLog("here"))
+        recording.disconnect()
+    assert b"RRF2FOOT" in (tmp_path / "a.rrd").read_bytes()
+    assert not is_cut(tmp_path / "a.rrd")
+
+
+@needs_vulkan
+def test_a_vulkan_driver_that_does_not_work_is_told(
+    recorded: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(name, "/nowhere")
+    with pytest.raises(RecordingError, match="is there a working Vulkan driver"):
+        player.screenshot(recorded.path, tmp_path / "a.png", time_s=1.0)
+
+
+def test_a_picture_is_by_itself_of_a_runs_start_and_of_the_end_of_what_was_watched(
+    recorded: Any, tmp_path: Path
+) -> None:
+    assert shown_time_s(recorded.path) == 0.0
+    path = tmp_path / "watched.rrd"
+    recording = open_recording(path, WATCH, "graph", rrb.Blueprint())
+    for time_s in (3.0, 5.5):
+        recording.set_time("sim_time", duration=time_s)
+        recording.log("/x", rr.TextLog("here"))
+    end_recording(recording, path)
+    assert shown_time_s(path) == 5.5
 
 
 def test_missing_file(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from twin.recording.digest import RunDigest
 from twin.recording.player import has_vulkan, headless_viewer
 from twin.recording.read_back import content_digest, read
 from twin.recording.sink import RecordingConfig, RerunSink
+from twin.recording.stream import UnwrittenError
 
 HERE = Path(__file__).parent
 
@@ -171,15 +172,36 @@ def test_a_run_goes_on_while_a_block_is_written(
     sink.close()
 
 
-def test_a_full_disk_ends_the_run(make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also if it fills up while the run is not looking: told with the block after, and again at the end."""
-    sink = RerunSink(tmp_path / "a.rrd")
+class _Screen:
+    def __init__(self) -> None:
+        self.shown: list[int] = []
+        self.is_over = False
+        self.now_ns = lambda: 0
+
+    def open(self, *_: Any) -> None: ...
+
+    def put(self, action: Any, *, lasting: bool = False) -> None:
+        self.shown.append(self.now_ns())
+
+    def finish(self) -> None:
+        self.is_over = True
+
+
+@pytest.mark.parametrize("told", ["told", "", "with a screen"])
+def test_a_full_disk_is_told_once(
+    make_run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: str
+) -> None:
+    """Also if it fills up while the run is not looking: with the block after; raised if nobody is there."""
+    lost: list[RecordingError] = []
+    screen: Any = _Screen() if told == "with a screen" else None
+    sink = RerunSink(tmp_path / "a.rrd", on_loss=lost.append if told else None, screen=screen)
     run = make_run(duration_s=3.0)
     monkeypatch.setattr("twin.recording.sink.monotonic_ns", lambda: run.world.time_ns)
     sink.declare(run.world)
 
-    def full(recording: Any, path: Path) -> None:
-        raise RecordingError(f"{path}: is the disk full?")
+    def full(recording: Any, path: Path | None) -> None:
+        if path is not None:
+            raise UnwrittenError(f"{path}: is the disk full?")
 
     monkeypatch.setattr("twin.recording.stream.flush", full)
 
@@ -189,6 +211,15 @@ def test_a_full_disk_ends_the_run(make_run: Any, tmp_path: Path, monkeypatch: py
                 sink.on_sample(sample)
             sink.on_tick(run.world)
 
+    if screen is not None:
+        screen.now_ns = lambda: run.world.time_ns
+    if told:
+        play()
+        sink.close()
+        assert [str(fault) for fault in lost] == [f"{tmp_path / 'a.rrd'}: is the disk full?"]
+        if screen is not None:
+            assert (max(screen.shown), screen.is_over) == (3_000_000_000, True)
+        return
     with pytest.raises(RecordingError, match="is the disk full"):
         play()
     assert run.world.time_ns <= 1_900_000_000

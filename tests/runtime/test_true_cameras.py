@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.drawing import needs_opengl
 from tests.runtime.test_cameras import Audience, blind
 from twin.bridge import types
 from twin.errors import ModelError
+from twin.recording.read_back import read
 from twin.runtime.open_run import OpenRun
 from twin.scenario.schema import Scenario
 
@@ -29,7 +32,9 @@ CAMERA = ("labels_map", "colored_map", "label_info")
 def look(scenario: Load, tmp_path: Path) -> Callable[..., OpenRun]:
     """Return runs of a camera half a metre above the floor that looks ahead."""
 
-    def run(kind: str, inside: str = "", more: str = "", world: str = WORLD, robot: str = "") -> OpenRun:
+    def run(
+        kind: str, inside: str = "", more: str = "", world: str = WORLD, robot: str = "", record: bool = False
+    ) -> OpenRun:
         path = tmp_path / "mast.urdf"
         path.write_text(
             "<robot name='mast'><link name='base'><inertial><mass value='1'/>"
@@ -44,7 +49,8 @@ def look(scenario: Load, tmp_path: Path) -> Callable[..., OpenRun]:
                 f"name: truth\nduration: 0.1 s\n{world}robots: [{{model: {path}, base: fixed{robot}}}]\n"
                 "checks: [{no_collision: {}}]"
             ),
-            record=False,
+            out=tmp_path / "out" if record else None,
+            record=record,
         )
 
     return run
@@ -73,9 +79,9 @@ def seen_at(x: float, y: float, z: float) -> tuple[int, int]:
     ("kind", "crates"), [("semantic", ("crate", "crate")), ("instance", ("crate_1", "crate_2"))]
 )
 def test_each_pixel_has_the_label_of_what_is_there(
-    look: Callable[..., OpenRun], kind: str, crates: tuple[str, str]
+    look: Callable[..., OpenRun], kind: str, crates: tuple[str, str], tmp_path: Path
 ) -> None:
-    run = look("segmentation", f"<segmentation_type>{kind}</segmentation_type>")
+    run = look("segmentation", f"<segmentation_type>{kind}</segmentation_type>", record=True)
     topics = (f"eye/ground_truth/{name}" for name in CAMERA)
     image, colours, info = heard(run, *topics)
     assert (image.encoding, image.step, image.header.frame_id) == ("16UC1", 320, "eye_optical_frame")
@@ -95,11 +101,16 @@ def test_each_pixel_has_the_label_of_what_is_there(
     pairs = {(number, *colour) for number, colour in zip(labels.ravel(), shown.reshape(-1, 3), strict=True)}
     assert len(pairs) == len({pair[1:] for pair in pairs}) == len(np.unique(labels))
     assert not shown[labels == 0].any()
+    blob = read(tmp_path / "out" / "truth.rrd").column(
+        "/cameras/eye/ground_truth/colored_map", "EncodedImage:blob"
+    )
+    with Image.open(BytesIO(np.array(blob.values[0][0], np.uint8).tobytes())) as kept:
+        assert np.array_equal(np.asarray(kept), shown), "the recording shows it, pixel by pixel"
 
 
 @needs_opengl
-def test_boxes_are_around_what_is_visible(look: Callable[..., OpenRun]) -> None:
-    (found,) = heard(look("boundingbox_camera"), "eye/ground_truth/boxes")
+def test_boxes_are_around_what_is_visible(look: Callable[..., OpenRun], tmp_path: Path) -> None:
+    (found,) = heard(look("boundingbox_camera", record=True), "eye/ground_truth/boxes")
     boxes = {each.id: each for each in found.detections}
     assert sorted(boxes) == ["crate_1", "crate_2", "post"]
     assert [each.results[0].hypothesis.class_id for each in found.detections] == ["crate", "crate", "post"]
@@ -111,6 +122,9 @@ def test_boxes_are_around_what_is_visible(look: Callable[..., OpenRun]) -> None:
     assert abs(box.center.position.x + box.size_x / 2.0 - right) < 1.0
     assert abs(box.center.position.y - box.size_y / 2.0 - top) < 1.0
     assert abs(box.center.position.y + box.size_y / 2.0 - bottom) < 1.0
+    entity = "/cameras/eye/ground_truth/boxes"
+    kept = read(tmp_path / "out" / "truth.rrd").column(entity, "LineStrips2D:labels")
+    assert list(kept.values[0]) == ["crate_1", "crate_2", "post"]
 
 
 @needs_opengl

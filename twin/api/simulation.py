@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import shutil
 import sys
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from twin.scenario.schema import Scenario
     from twin.scenario.verdict import Verdict
 
+_LOG = logging.getLogger("twin.run")
 NO_OVERRIDES: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -156,8 +158,7 @@ class Simulation(Participant):
     def finish(self) -> Verdict:
         """End the run now, and judge it as it stands. Harmless when repeated.
 
-        Raises:
-            RecordingError: Something that it leaves cannot be written.
+        What it leaves and cannot write, as the disk is full, is told by the logger `twin.run`.
         """
         if self._verdict is None:
             run = self._running
@@ -165,7 +166,10 @@ class Simulation(Participant):
                 verdict = replace(run.finish(), command=self._command)
                 self._close(verdict)
                 if self.folder is not None:
-                    verdict.write(self.folder)
+                    try:
+                        verdict.write(self.folder)
+                    except RecordingError as fault:
+                        _LOG.warning("%s", fault)
         return self.verdict
 
     @property

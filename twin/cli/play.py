@@ -28,7 +28,12 @@ def play(
     ] = None,
     at: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", min=0.0, help="Simulated time of the picture.", show_default="start"),
+        typer.Option(
+            metavar="SECONDS",
+            min=0.0,
+            help="Simulated time of the picture.",
+            show_default="start; of a graph its end",
+        ),
     ] = None,
     view: Annotated[
         str | None,

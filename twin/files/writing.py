@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 
 from twin.errors import RecordingError
 
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 LOCK = ".lock"
 """In a folder that is being written; holds the id of the process."""
 
@@ -77,6 +79,12 @@ def replaced(path: Path) -> Iterator[Path]:
     except BaseException:
         new.unlink(missing_ok=True)
         raise
+
+
+def is_full(fault: BaseException) -> bool:
+    """Tell whether what could not be written, for which an error stands, found no room."""
+    cause = fault.__cause__ or fault
+    return isinstance(cause, OSError) and cause.errno in _NO_ROOM
 
 
 def make_folder(path: Path) -> Path:

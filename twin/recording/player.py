@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from twin.errors import RecordingError
 from twin.files.writing import write_whole
-from twin.recording.read_back import check_recording, has_video
+from twin.recording.read_back import check_recording, check_whole, has_video, shown_time_s
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -70,7 +70,7 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
     Args:
         path: The recording.
         png: To write.
-        time_s: Simulated time to show [s]; None shows the start.
+        time_s: Simulated time to show [s]; None shows the start, of a graph that was watched the end.
         view: Name of one view, such as `Simulation`; None shows the whole window.
 
     Raises:
@@ -78,7 +78,8 @@ def screenshot(path: Path, png: Path, *, time_s: float | None = None, view: str 
     """
     if png.suffix != ".png":
         raise RecordingError(f"{png}: not a picture that can be written; valid: *.png")
-    with headless_viewer(path, time_s=time_s) as client:
+    check_whole(path)
+    with headless_viewer(path, time_s=shown_time_s(path) if time_s is None else time_s) as client:
         view_id = None
         if view is not None:
             found = {v.name: v.view_id for v in client.get_state().views}
@@ -115,7 +116,7 @@ def headless_viewer(path: Path, *, time_s: float | None = None) -> Iterator[View
     Raises:
         RecordingError: No such recording, or the viewer does not start for want of a Vulkan driver.
     """
-    check_recording(path)
+    check_whole(path)
     if not has_vulkan():
         raise RecordingError("no Vulkan driver for a picture; `apt-get install mesa-vulkan-drivers` has one")
     from rerun.experimental import ViewerClient
@@ -131,7 +132,10 @@ def headless_viewer(path: Path, *, time_s: float | None = None) -> Iterator[View
             if viewer.poll() is not None:
                 raise RecordingError("the viewer did not start; is there a working Vulkan driver?")
             client = ViewerClient(f"rerun+http://{LOCALHOST}:{port}/proxy")
-            _open(client, path, time_s)
+            try:
+                _open(client, path, time_s)
+            except ConnectionError as fault:
+                raise RecordingError("the viewer broke off; is there a working Vulkan driver?") from fault
             yield client
         finally:
             viewer.terminate()

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from twin.errors import RecordingError, nearest
 from twin.files.reading import open_file
+from twin.recording.whole_messages import is_cut
 
 if TYPE_CHECKING:
     import rerun.chunk as rc
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 MAGIC = (b"RRF2", b"RRIO")
 """First bytes of a Rerun recording."""
 
+WATCH = "twin-watch"
+"""Application of recordings of `twin watch`."""
 _UNITS = (
     (r"/velocity/.*/linear/.*", "m/s"),
     (r"/velocity/.*/angular/.*", "rad/s"),
@@ -148,6 +151,41 @@ def check_recording(path: Path) -> Path:
     if magic not in MAGIC:
         raise RecordingError(f"{path}: not a Rerun recording; valid: an .rrd file as `twin run` writes it")
     return path
+
+
+def check_whole(path: Path) -> None:
+    """See that a recording does not end within a message: for the rest of that one a viewer would wait.
+
+    Raises:
+        RecordingError: It does, or is none.
+    """
+    if is_cut(check_recording(path)):
+        raise RecordingError(
+            f"{path}: the recording is damaged: it ends within a message, as a copy does that was broken off"
+        )
+
+
+def shown_time_s(path: Path) -> float:
+    """Return the time [s] that a picture of a recording shows by itself: the end of a graph, a run's start.
+
+    A graph that is watched shows what was said latest, and perhaps nothing at its start.
+
+    Raises:
+        RecordingError: See `read`.
+    """
+    reader = _reader(path)
+    store = _stores(reader, path)[0]
+    times = [
+        moments
+        for chunk in reader.stream(store=store)
+        for _, moments, _ in _components(chunk.to_record_batch())
+        if moments is not None and len(moments)
+    ]
+    if not times:
+        return 0.0
+    if store.application_id == WATCH:
+        return float(max(moments.max() for moments in times)) * 1e-9
+    return float(min(moments.min() for moments in times)) * 1e-9
 
 
 def read(path: Path) -> Recording:

@@ -107,6 +107,7 @@ class RerunSink:
         config: RecordingConfig | None = None,
         screen: LiveScreen | None = None,
         recording_id: str = "run",
+        on_loss: Callable[[RecordingError], None] | None = None,
     ) -> None:
         """Prepare; the file is created by `declare`.
 
@@ -115,6 +116,8 @@ class RerunSink:
             config: What to keep.
             screen: Shows the recording while it is made; the run never waits for it.
             recording_id: Fixed by the caller, so that two equal runs write equal recordings.
+            on_loss: Called once if the file cannot be written on, as the disk is full; the screen goes on.
+                What can be read of it stays. None: it is raised.
 
         Raises:
             RecordingError: Pictures are to be a video, and PyAV is not installed.
@@ -127,6 +130,7 @@ class RerunSink:
             check_installed()
         self._recording_id = recording_id
         self._screen = screen
+        self._on_loss = on_loss
         self._world: World | None = None
         self._early: list[Any] = []
         self._sources: list[Rows[Any]] = []
@@ -149,6 +153,7 @@ class RerunSink:
         wheels: Mapping[str, Collection[str]] = NO_WHEELS,
         cameras: Mapping[str, Mounted] = NO_CAMERAS,
         depths: Collection[str] = (),
+        truths: Collection[str] = (),
     ) -> None:
         """Open the file, log what never changes and the poses at the start; samples that came earlier follow.
 
@@ -157,6 +162,7 @@ class RerunSink:
             wheels: By robot: joints that turn without end, which are not plotted.
             cameras: By topic: what makes the pictures there.
             depths: Topics of depth images that cameras make.
+            truths: Topics of labels in colours, and of boxes, that cameras of ground truth make.
 
         Raises:
             RecordingError: The file cannot be written, or the screen is not there.
@@ -168,20 +174,27 @@ class RerunSink:
         from twin.recording.extents import Stage, robot_box
         from twin.recording.poses import Poses
         from twin.recording.shapes import declare_decals, declare_shapes
-        from twin.recording.stream import declare_frames, open_recording
+        from twin.recording.stream import UnwrittenError, declare_frames, open_recording
 
         shapes = world.shapes()
         frames = Frames(world.body_names)
         self._robots: list[RobotBox] = [robot_box(world, shapes, name) for name in frames.robots]
         self._stage: Stage = Stage(world, shapes, self._robots)
-        shown = [*map(picture_entity, cameras), *map(depth_entity, depths)]
-        self._depths = frozenset(depths)
+        shown = [*map(picture_entity, [*cameras, *truths]), *map(depth_entity, depths)]
+        self._depths, self._truths = frozenset(depths), frozenset(truths)
         blueprint = layout(
             self._stage, self._robots, mirrors=self.mirrors, pictures=shown if self._images_period else ()
         )
-        self._recording: rr.RecordingStream = open_recording(
-            self._target, _APPLICATION_ID, self._recording_id, blueprint, self._screen
-        )
+        names = _APPLICATION_ID, self._recording_id
+        try:
+            self._recording: rr.RecordingStream = open_recording(
+                self._target, *names, blueprint, self._screen
+            )
+        except UnwrittenError as fault:
+            self._lose(fault)
+            if self._closed:  # without a screen
+                return
+            self._recording = open_recording(None, *names, blueprint, self._screen)
         self._poses: Poses = Poses(
             world.body_names,
             self._stage,
@@ -201,6 +214,7 @@ class RerunSink:
             radii={box.robot: box.radius for box in self._robots},
             wheels=wheels,
             cameras=cameras,
+            truths=self._truths,
             images_period=self._images_period,
             images=self._config.images,
         )
@@ -232,11 +246,11 @@ class RerunSink:
         return msgtype in SHOWN_TYPES
 
     def wants(self, publisher: Publisher[Any]) -> bool:
-        """Return whether it shows a cloud, or a picture or depths that are due (for `Bus.wishes`)."""
+        """Return whether it shows a cloud, or a picture, depths or labels that are due (for `Bus.wishes`)."""
         if publisher.msgtype == _CLOUD:  # a camera shows its own as a picture
             topics = (each for each in publisher.node.endpoints if isinstance(each, type(publisher)))
             return not self._closed and not any(map(_is_picture, topics))
-        if not _is_picture(publisher) and publisher.name not in self._depths:
+        if not _is_picture(publisher) and publisher.name not in self._depths | self._truths:
             return False
         if self._images_period is None or self._closed:
             return False
@@ -250,8 +264,10 @@ class RerunSink:
         """Sample the poses when they are due, send the block when it is full, see that it was written.
 
         Raises:
-            RecordingError: A block could not be written.
+            RecordingError: A block could not be written, and nobody is told of it otherwise.
         """
+        if self._closed:
+            return
         time_ns = world.time_ns
         if time_ns >= self._next_pose_ns:
             self._next_pose_ns = next_due(self._period, time_ns)
@@ -267,47 +283,63 @@ class RerunSink:
         """Write what waits, the verdict (as in `verdict.json`) and the last screen; the rest is ignored.
 
         Raises:
-            RecordingError: The file is not whole.
+            RecordingError: The file is not whole, and nobody is told of it otherwise.
         """
         if self._world is None or self._closed:
             return
-        from twin.recording.blueprint import layout
-        from twin.recording.channels.images import DepthChannel
-        from twin.recording.channels.pictures import PictureChannel
-        from twin.recording.channels.series import JointChannel
-        from twin.recording.stream import end_recording, handed_over, log_verdict
+        from twin.recording.stream import UnwrittenError, end_recording
 
-        self._closed = True
         self._takers.clear()
         self._poses.rows.append((self._world.time_ns, *self._world.body_poses()))
         try:
             self._send()
-            if verdict is not None:
-                log_verdict(self._recording, verdict)
-            self._stage.fit()
-            self._set_stage()
-            # A viewer takes the last screen of a file; that of the start is for runs that are killed.
-            cameras = [source for source in self._sources if isinstance(source, PictureChannel)]
-            shown = [source.entity for source in cameras]
-            depths = (source for source in self._sources if isinstance(source, DepthChannel))
-            shown += [source.entity for source in depths if source.has_images]
-            blueprint = layout(
-                self._stage,
-                self._robots,
-                self._world.time_ns,
-                mirrors=self.mirrors,
-                pictures=shown,
-                flat=[source.entity for source in cameras if source.topic not in self._context.hung],
-                joints_move=any(
-                    isinstance(source, JointChannel) and source.moves for source in self._sources
-                ),
-            )
-            with handed_over(blueprint):
-                self._recording.send_blueprint(blueprint)
+            if not self._closed:
+                self._send_end(self._world, verdict)
         finally:
-            end_recording(self._recording, self._target)
-            if self._screen is not None:
-                self._screen.finish()
+            lost, self._closed = self._closed, True
+            try:
+                if not lost:
+                    end_recording(self._recording, self._target)
+            except UnwrittenError as fault:
+                self._lose(fault)
+            finally:
+                if self._screen is not None:
+                    self._screen.finish()
+
+    def _send_end(self, world: World, verdict: dict[str, Any] | None) -> None:
+        """Send the verdict, and the last screen."""
+        from twin.recording.blueprint import layout
+        from twin.recording.channels.images import DepthChannel
+        from twin.recording.channels.pictures import PictureChannel
+        from twin.recording.channels.series import JointChannel
+        from twin.recording.channels.truth import LabelChannel, TrueBoxChannel
+        from twin.recording.stream import handed_over, log_verdict
+
+        if verdict is not None:
+            log_verdict(self._recording, verdict)
+        self._stage.fit()
+        self._set_stage()
+        # A viewer takes the last screen of a file; that of the start is for runs that are killed.
+        cameras = [
+            source
+            for source in self._sources
+            if isinstance(source, PictureChannel | LabelChannel)
+            or (isinstance(source, TrueBoxChannel) and source.is_alone)
+        ]
+        shown = [source.entity for source in cameras]
+        depths = (source for source in self._sources if isinstance(source, DepthChannel))
+        shown += [source.entity for source in depths if source.has_images]
+        blueprint = layout(
+            self._stage,
+            self._robots,
+            world.time_ns,
+            mirrors=self.mirrors,
+            pictures=shown,
+            flat=[source.entity for source in cameras if source.topic not in self._context.hung],
+            joints_move=any(isinstance(source, JointChannel) and source.moves for source in self._sources),
+        )
+        with handed_over(blueprint):
+            self._recording.send_blueprint(blueprint)
 
     def _taker(self, topic: str, msgtype: str) -> _Take | None:
         """Return what to do with the messages of a topic, if anything."""
@@ -334,6 +366,8 @@ class RerunSink:
         from twin.recording.stream import begin_flush
 
         self._wait()
+        if self._closed:
+            return
         send(self._recording, (chunk for source in self._sources for chunk in source.take_chunks()))
         if self._stage.grow():
             self._set_stage()
@@ -342,11 +376,27 @@ class RerunSink:
 
     def _wait(self) -> None:
         """Wait until what was sent is in the file."""
-        from twin.recording.stream import flush
+        from twin.recording.stream import UnwrittenError, drop_file, flush
 
         if self._under_way:
             self._under_way = False
-            flush(self._recording, self._target)
+            try:
+                flush(self._recording, self._target)
+            except UnwrittenError as fault:
+                self._lose(fault)
+                drop_file(self._recording)
+
+    def _lose(self, fault: RecordingError) -> None:
+        """Go on without the file, and tell of it; without a screen there is nothing left to do."""
+        if self._on_loss is None:
+            raise fault
+        self._target = None
+        if self._screen is None:
+            self._closed = True
+            self._takers.clear()
+            self._sources.clear()
+            self._early.clear()
+        self._on_loss(fault)
 
     def _set_stage(self) -> None:
         """Log what depends on how much floor there is to see; it takes the place of what was."""

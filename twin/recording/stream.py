@@ -18,6 +18,7 @@ from twin.files.writing import replaced
 from twin.recording.columns import Chunk, Component, send, sim_time
 from twin.recording.frames import WORLD, Frames
 from twin.recording.live_screen import LiveScreen
+from twin.recording.whole_messages import cut_off
 
 Stream = TypeVar("Stream", bound=rr.RecordingStream)
 
@@ -27,8 +28,14 @@ WALL_CLOCK_METRICS = frozenset(
 """Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
 FLUSH_TIMEOUT_S = 60
 """Longest wait for a disk that is slow."""
+_SPARE = 1 << 16
+"""Bytes of a file that could not be written on which are given back, for the verdict of the run."""
 _abandoned: list[Any] = []
 """Streams whose writer has ended."""
+
+
+class UnwrittenError(RecordingError):
+    """The file of a recording could not be written to its end."""
 
 
 class _Shown(rr.RecordingStream):
@@ -77,6 +84,7 @@ def open_recording(
     It has no footer, an index of all chunks: that would grow in memory for as long as a run goes on.
 
     Raises:
+        UnwrittenError: The disk is full.
         RecordingError: The file cannot be written, or the screen is not there.
     """
     if target is not None:
@@ -88,6 +96,7 @@ def open_recording(
                 f"{target}: cannot write the recording: {error.strerror}; choose another folder"
             ) from error
         if not _has_room(target.parent):  # for its writer Rerun would wait for ever
+            target.unlink()
             raise _not_whole(target)
     if screen is None:
         recording = without_clock(rr.RecordingStream, application_id, recording_id)
@@ -149,24 +158,39 @@ def begin_flush(recording: rr.RecordingStream) -> None:
 def flush(recording: rr.RecordingStream, target: Path | None) -> None:
     """Wait until everything so far is in the file.
 
-    A full disk ends Rerun's writer, for which its flush then may wait for ever.
+    A full disk ends Rerun's writer, for which its flush then may wait for ever. What can be read of the file
+    stays.
 
     Raises:
-        RecordingError: It could not be written.
+        UnwrittenError: It could not be written.
     """
     if target is None:
         return
+    if _is_abandoned(recording):
+        raise _not_whole(target)
     for _ in range(FLUSH_TIMEOUT_S):
         try:
             recording.flush(timeout_sec=1.0)
             return
         except RuntimeError as fault:
             if "timed out" not in str(fault) or not _has_room(target.parent):
+                with suppress(OSError):  # the disk is gone
+                    cut_off(target, _SPARE)
                 break
     # When it is collected, or the process ends, Rerun would wait for that writer, too.
     _abandoned.append(recording.inner)
     rr.unregister_shutdown()
     raise _not_whole(target)
+
+
+def _is_abandoned(recording: rr.RecordingStream) -> bool:
+    return any(recording.inner is each for each in _abandoned)
+
+
+def drop_file(recording: rr.RecordingStream) -> None:
+    """Go on with the screen alone, if there is one."""
+    if isinstance(recording, _Shown):
+        recording.keeps = False
 
 
 def _has_room(folder: Path) -> bool:
@@ -184,10 +208,11 @@ def end_recording(recording: rr.RecordingStream, target: Path | None) -> None:
     A stream whose writer has ended is left open: to close it would wait for that writer, for ever.
 
     Raises:
-        RecordingError: The file is not whole.
+        UnwrittenError: The file is not whole.
     """
     flush(recording, target)
-    recording.disconnect()
+    if not _is_abandoned(recording):
+        recording.disconnect()
 
 
 @contextmanager
@@ -204,8 +229,8 @@ def whole_recording(path: Path) -> Iterator[Path]:
         raise _not_whole(path) from fault
 
 
-def _not_whole(path: Path) -> RecordingError:
-    return RecordingError(f"{path}: the recording could not be written to its end; is the disk full?")
+def _not_whole(path: Path) -> UnwrittenError:
+    return UnwrittenError(f"{path}: the recording could not be written to its end; is the disk full?")
 
 
 def declare_up(recording: rr.RecordingStream) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import time
 import uuid
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from twin.recording.sink import RerunSink
     from twin.sim.world import World
 
+_LOG = logging.getLogger("twin.run")
 _MOST_ENDED = 4
 """Closed runs in memory: they are in circles, and to look for these takes as long as to build a small run."""
 _HELD_S = 0.1
@@ -131,7 +134,9 @@ class OpenRun:
         """What the run was, as far as it went."""
         self._out = out
         self._outside = outside
-        self._sink = _recording(scenario, out if record else None, screen)
+        self.lost: list[RecordingError] = []
+        """Why parts of what the run leaves could not be written to their end, as on a disk that is full."""
+        self._sink = _recording(scenario, out if record else None, screen, self._lose)
         self._wall_s = self._cpu_s = 0.0
         self._finished: str | None = None
         self._endless = endless
@@ -151,7 +156,7 @@ class OpenRun:
         if bag is not None:
             from twin.bridge.bags.tap import BagTap
 
-            bag_tap = BagTap(bag, hidden=bag_hidden_topics)
+            bag_tap = BagTap(bag, hidden=bag_hidden_topics, on_loss=self._lose)
         taps = [*taps, *(() if self._sink is None else (shown(self._sink),))]
         taps += [] if bag_tap is None else [bag_tap.on_sample]
         self._observers = taps
@@ -189,14 +194,26 @@ class OpenRun:
             if self._sink is not None:
                 stacks = parts.stacks.items()
                 wheels = {name: derive.wheels(stack.handle.description) for name, stack in stacks}
-                self._sink.declare(parts.world, wheels, _cameras(parts), _depths(parts))
+                self._sink.declare(parts.world, wheels, _cameras(parts), _depths(parts), _truths(parts))
             self._pace: Pace | None = None
             if pace is not None:
                 self._keep(Pace(pace) if isinstance(pace, int | float) else pace)
             self._ending = ending.pop_all()
             if out is not None and not endless:
-                self._ending.callback(lambda: self.kept().write(out))
+                self._ending.callback(self._or_lose, lambda: self.kept().write(out))
             self._ending.callback(OpenRun._ended.append, weakref.ref(self.run))
+
+    def _lose(self, fault: RecordingError) -> None:
+        """Tell of what cannot be written, without which the run goes on."""
+        self.lost.append(fault)
+        _LOG.warning("%s (the run goes on; what there is of it can be read)", fault)
+
+    def _or_lose(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+        except RecordingError as fault:
+            self.lost.append(fault)
+            _LOG.warning("%s", fault)
 
     def _keep(self, pace: Pace) -> None:
         world = self.run.world
@@ -339,16 +356,12 @@ class OpenRun:
             each()
 
     def finish(self) -> Verdict:
-        """Judge the run as it stands, write what it leaves, and close it.
-
-        Raises:
-            RecordingError: The recording, the bag or a map cannot be written.
-        """
+        """Judge the run as it stands, write what it leaves but what is `lost`, and close it."""
         with self._ending:
             verdict = self._verdict()
             self._finished = verdict.digest
             if self._out is not None:
-                _save_maps(self.run.parts.stacks, self._out)
+                self._or_lose(partial(_save_maps, self.run.parts.stacks, self._out))
             if self._sink is not None:
                 self._sink.close(verdict.to_dict())
         return verdict
@@ -428,6 +441,7 @@ def run(
     """Run a scenario to its verdict; see `OpenRun` and `OpenRun.advance_to_end`.
 
     Raises:
+        RecordingError: Something that it leaves cannot be written to its end.
         TwinError: The run cannot be made, or the physics diverged.
     """
     started = OpenRun(
@@ -443,9 +457,12 @@ def run(
     )
     try:
         started.advance_to_end(progress, watch)
-        return started.finish()
+        verdict = started.finish()
     finally:
         started.close()
+    if started.lost:
+        raise started.lost[0]
+    return verdict
 
 
 def _save_maps(stacks: Mapping[str, RobotStack], folder: Path) -> None:
@@ -474,7 +491,12 @@ def _save_model(parts: Parts, folder: Path) -> None:
         raise RecordingError(f"{folder}: the model cannot be written there: {fault.strerror}") from fault
 
 
-def _recording(scenario: Scenario, out: Path | None, screen: LiveScreen | None) -> RerunSink | None:
+def _recording(
+    scenario: Scenario,
+    out: Path | None,
+    screen: LiveScreen | None,
+    on_loss: Callable[[RecordingError], None],
+) -> RerunSink | None:
     kept = out is not None and scenario.recording.enabled
     if screen is None and not kept:
         return None
@@ -489,12 +511,18 @@ def _recording(scenario: Scenario, out: Path | None, screen: LiveScreen | None) 
     if file is None:
         name = f"{name}-{uuid.uuid4()}"  # each is a recording of its own, which the viewer turns to
     config = live if screen is not None else RecordingConfig(**kept_as)
-    return RerunSink(file, config=config, recording_id=name, screen=screen)
+    return RerunSink(file, config=config, recording_id=name, screen=screen, on_loss=on_loss)
 
 
 def _depths(parts: Parts) -> list[str]:
     """Return the topics of depth images."""
     return [camera.depths for stack in parts.stacks.values() for camera in stack.cameras if camera.depths]
+
+
+def _truths(parts: Parts) -> list[str]:
+    """Return the topics of labels in colours, and of boxes, that are ground truth."""
+    cameras = (camera for stack in parts.stacks.values() for camera in stack.cameras)
+    return [topic for camera in cameras for topic in camera.truths]
 
 
 def _cameras(parts: Parts) -> dict[str, Mounted]:

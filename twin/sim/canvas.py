@@ -26,6 +26,9 @@ PACKAGES = "`apt-get install libegl1 libgl1-mesa-dri`, or `libosmesa6` and MUJOC
 
 _FINDS = {"egl": "eglGetProcAddress", "osmesa": "OSMesaGetProcAddress"}
 """What finds a function of OpenGL by its name."""
+_PLATFORM, _WISH = "PYOPENGL_PLATFORM", "MUJOCO_GL"
+_drawn_by = ""
+"""The module that had a context here."""
 _GL_RENDERER, _GL_VERSION = 0x1F01, 0x1F02
 _FLAGS = mujoco.mjtRndFlag
 _PLAIN = {_FLAGS.mjRND_SEGMENT: 1, _FLAGS.mjRND_IDCOLOR: 1}
@@ -45,7 +48,8 @@ class Canvas:
             SimulationError: There is no OpenGL without a display here.
         """
         self._opengl, self._size = _opengl(width, height), (width, height)
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        with _wished(_drawn_by):
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         # At the end of the process before MuJoCo's EGL ends, which is registered already.
@@ -117,34 +121,70 @@ def _free(opengl: Any, context: mujoco.MjrContext, process: int) -> None:
 
 
 def _opengl(width: int, height: int) -> Any:
+    """Return a context of the first library that has one; who has drawn once draws on."""
+    names, faults = _backends(), []
+    if _drawn_by in names:
+        names = [_drawn_by]
+    for name in names:
+        before = set(sys.modules), os.environ.get(_PLATFORM)
+        try:
+            context = import_module(f"mujoco.{name}").GLContext(width, height)
+            context.make_current()
+        except Exception as fault:  # of three libraries, each with its own kinds
+            faults.append(f"{BACKENDS.get(name, name)}: {fault}")
+            _forget(*before)
+        else:
+            _note(name)
+            return context
+    raise SimulationError(
+        f"MuJoCo finds no OpenGL without a display ({'; '.join(faults)}); it needs EGL or OSMesa ({PACKAGES})"
+    )
+
+
+@contextmanager
+def _wished(name: str) -> Iterator[None]:
+    """Have MuJoCo find OpenGL's functions in the library of the context: it goes by the user's wish."""
+    before = os.environ.get(_WISH)
+    if name in BACKENDS:
+        os.environ[_WISH] = name
     try:
-        context = import_module(f"mujoco.{_backend()}").GLContext(width, height)
-        context.make_current()
-    except SimulationError:
-        raise
-    except Exception as fault:  # of three libraries, each with its own kinds
-        raise SimulationError(
-            f"MuJoCo finds no OpenGL without a display ({fault}); it needs EGL or OSMesa ({PACKAGES})"
-        ) from fault
-    return context
+        yield
+    finally:
+        os.environ.pop(_WISH, None)
+        if before is not None:
+            os.environ[_WISH] = before
+
+
+def _note(name: str) -> None:
+    global _drawn_by
+    _drawn_by = name
+
+
+def _forget(modules: set[str], platform: str | None) -> None:
+    """Let PyOpenGL be set to another library, which it is when it is imported."""
+    for name in set(sys.modules) - modules:
+        if name.partition(".")[0] == "OpenGL" or name.startswith("mujoco."):
+            del sys.modules[name]
+    if platform is None:
+        os.environ.pop(_PLATFORM, None)
 
 
 def _gl_strings(*names: int) -> list[str]:
     """Return what the current context says of itself; PyOpenGL may be set to another library."""
-    backend = _backend()
-    if backend not in _FINDS:
+    if _drawn_by not in _FINDS:
         return []
-    find = getattr(ctypes.CDLL(ctypes.util.find_library(BACKENDS[backend])), _FINDS[backend])
+    find = getattr(ctypes.CDLL(ctypes.util.find_library(BACKENDS[_drawn_by])), _FINDS[_drawn_by])
     find.restype = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_uint)
     get_string = find(b"glGetString")
     return [get_string(name).decode() for name in names]
 
 
-def _backend() -> str:
+def _backends() -> list[str]:
+    """Return which of MuJoCo's modules have their library here, and the one that is wished for first."""
     if sys.platform == "darwin":
-        return "cgl"
-    wish = os.environ.get("MUJOCO_GL", "").lower()
-    for name in sorted(BACKENDS, key=lambda name: name != wish):
-        if ctypes.util.find_library(BACKENDS[name]):
-            return name
-    raise SimulationError(f"MuJoCo needs EGL or OSMesa to draw without a display ({PACKAGES})")
+        return ["cgl"]
+    wish = os.environ.get(_WISH, "").lower()
+    names = [name for name, library in BACKENDS.items() if ctypes.util.find_library(library)]
+    if not names:
+        raise SimulationError(f"MuJoCo needs EGL or OSMesa to draw without a display ({PACKAGES})")
+    return sorted(names, key=lambda name: name != wish)

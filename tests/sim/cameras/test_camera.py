@@ -7,6 +7,7 @@ import subprocess
 import sys
 from ctypes.util import find_library
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,7 +18,7 @@ from tests.sim.cameras.conftest import BALL, BALL_AT, BALL_RADIUS, EYE, WALL, Lo
 from twin.bridge.msgs import Header, new
 from twin.errors import ModelError
 from twin.geometry import Pose3
-from twin.models.shapes import Box, Sphere
+from twin.models.shapes import Box, Capsule, Cylinder, Geometry, Sphere
 from twin.nodes.cameras.messages import camera_info
 from twin.sim.scene import Shape, StaticBody
 
@@ -173,16 +174,32 @@ def test_there_is_no_depth_in_the_sky_and_beyond_the_far_plane(camera_at: Look) 
     assert 0.5 < np.nanmin(view.depth) < np.nanmax(view.depth) <= 1.5
 
 
-def test_a_camera_inside_a_wall_goes_on(camera_at: Look) -> None:
-    around = StaticBody(
-        name="around",
-        T_world_body=Pose3.from_xyz_rpy(EYE),
-        shapes=(Shape(geometry=Box(size=(0.5, 0.5, 0.5))),),
-    )
-    view = camera_at(around, WALL).look(0, depth=True)
-    assert view.colours is not None
-    assert view.depth is not None
-    assert view.depth.shape == (120, 160)
+_NOT = (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("shape", "rpy", "miss"),
+    [
+        (Box(size=(0.5, 0.5, 0.5)), (0.3, 0.2, 0.1), (0.0, 0.34, 0.0)),
+        (Sphere(radius=0.2), _NOT, (0.12, 0.12, 0.12)),
+        (Cylinder(radius=0.1, length=0.6), (0.0, 0.5 * np.pi, 0.0), (0.0, 0.0, 0.15)),
+        (Capsule(radius=0.1, length=0.4), _NOT, (0.0, 0.09, 0.25)),
+    ],
+    ids=["box", "ball", "cylinder", "capsule"],
+)
+def test_a_camera_inside_a_wall_says_so_once_and_goes_on(
+    camera_at: Look, caplog: pytest.LogCaptureFixture, shape: Geometry, rpy: Any, miss: Any
+) -> None:
+    for offset, said in ((miss, []), (_NOT, ["camera 'camera' of mast is inside around"])):
+        T_world_body = Pose3.from_xyz_rpy(np.add(EYE, offset), rpy)
+        camera = camera_at(
+            StaticBody(name="around", T_world_body=T_world_body, shapes=(Shape(geometry=shape),))
+        )
+        for _ in range(2):
+            view = camera.look(0, depth=True)
+            assert view.depth is not None
+            assert view.depth.shape == (120, 160)
+        assert [record.getMessage().partition(":")[0] for record in caplog.records] == said
 
 
 def test_encodings_are_of_the_same_picture(camera_at: Look) -> None:
@@ -285,7 +302,20 @@ def test_a_camera_faster_than_the_physics_is_refused(camera_at: Look) -> None:
         camera_at(rate=600)
 
 
-def test_another_process_sees_the_same_with_egl_as_with_osmesa(camera_at: Look) -> None:
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"MUJOCO_GL": "osmesa" if find_library("OSMesa") else "egl"},
+        pytest.param(
+            {"__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"},
+            marks=pytest.mark.skipif(not find_library("OSMesa"), reason="OSMesa is not installed"),
+        ),
+    ],
+    ids=["asked for", "as EGL has no driver"],
+)
+def test_another_process_sees_the_same_with_egl_as_with_osmesa(
+    camera_at: Look, asked: dict[str, str]
+) -> None:
     """OSMesa is taken where it is installed: without it MuJoCo does not start if it is asked for."""
     view = camera_at(BALL, inside=NOISE).look(0, depth=True)
     assert view.colours is not None
@@ -301,7 +331,7 @@ def test_another_process_sees_the_same_with_egl_as_with_osmesa(camera_at: Look) 
         [sys.executable, "-c", code],
         env={
             **inherited,
-            "MUJOCO_GL": "osmesa" if find_library("OSMesa") else "egl",
+            **asked,
             "PYTHONPATH": str(Path(__file__).parents[3]),
         },
         capture_output=True,

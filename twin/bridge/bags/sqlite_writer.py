@@ -103,6 +103,10 @@ class SqliteWriter:
         self.flush()
         self._db.close()
 
+    def leave(self) -> None:
+        """Close the database without the metadata; what was not flushed is lost."""
+        self._db.close()
+
     def _insert(self, table: str, *values: object) -> None:
         marks = ", ".join("?" * len(values))
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from twin.bridge.graph import Graph, is_hidden
 from twin.bridge.topics import Publisher, Sample, Subscription
 from twin.bridge.wire.external import Arrival
 from twin.errors import RecordingError
+from twin.files.writing import is_full
 
 _OUTSIDE = -1
 
@@ -23,7 +25,14 @@ _OUTSIDE = -1
 class BagTap:
     """A tap of a bus (`Bus.tap`) that writes a bag, and into it which node published each message."""
 
-    def __init__(self, folder: Path, config: BagConfig | None = None, *, hidden: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        config: BagConfig | None = None,
+        *,
+        hidden: bool = False,
+        on_loss: Callable[[RecordingError], None] | None = None,
+    ) -> None:
         """Prepare for a bag; it is made when time first goes on, so a bus that fails before leaves none.
 
         Args:
@@ -31,6 +40,9 @@ class BagTap:
             config: How it is written.
             hidden: Whether topics of actions are recorded too: readers that know no names of their parts,
                 as mcap-ros2-support, stop at them.
+            on_loss: Called once if the bag cannot be written on, as the disk is full; what follows is not
+                recorded, and what there is can be read as the bag of a process that was killed. None: it is
+                raised.
 
         Raises:
             RecordingError: it exists already.
@@ -40,6 +52,7 @@ class BagTap:
         self.folder = folder
         self._config = config
         self._hidden = hidden
+        self._on_loss = on_loss
         self._writer: BagWriter | None = None
         self._bus: Bus | None = None
         self._graph = Graph()
@@ -62,7 +75,7 @@ class BagTap:
         Raises:
             RecordingError: the disk is full or gone.
         """
-        if is_hidden(sample.topic) and not self._hidden:
+        if self._closed or (is_hidden(sample.topic) and not self._hidden):
             return
         node, time_ns = sample.publisher.node, sample.time_ns
         self._bus = node.bus
@@ -72,7 +85,7 @@ class BagTap:
 
     def wants(self, publisher: Publisher[Any]) -> bool:
         """Return whether it records a topic (for `Bus.needs`)."""
-        return self._hidden or not is_hidden(publisher.name)
+        return not self._closed and (self._hidden or not is_hidden(publisher.name))
 
     def on_arrival(self, arrival: Arrival) -> None:
         """Record one message from outside that a node subscribes to (for `Bus.arrival_taps`), only once.
@@ -81,7 +94,11 @@ class BagTap:
             RecordingError: the disk is full or gone.
         """
         receiver, source = arrival.receiver, arrival.source
-        if not isinstance(receiver, Subscription) or (is_hidden(receiver.name) and not self._hidden):
+        if (
+            self._closed
+            or not isinstance(receiver, Subscription)
+            or (is_hidden(receiver.name) and not self._hidden)
+        ):
             return
         if self._receivers.setdefault(receiver.name, receiver) is not receiver:
             return  # every other subscription of the topic has it too
@@ -99,12 +116,25 @@ class BagTap:
         """
         if self._closed:
             return
-        self._closed = True
-        writer = self._writer or self._begin()
         try:
-            writer.attach(origins.NAME, origins.MEDIA_TYPE, self._origins().pack())
-        finally:
-            writer.close()
+            writer = self._writer or self._begin()
+            self._closed = True
+            try:
+                writer.attach(origins.NAME, origins.MEDIA_TYPE, self._origins().pack())
+            finally:
+                writer.close()
+        except RecordingError as fault:
+            self._lose(fault)
+
+    def _lose(self, fault: RecordingError) -> None:
+        """Record no more, and tell of it, or raise what keeps a bag from being begun, unless it is that."""
+        self._closed = True
+        if self._writer is not None:
+            self._writer.leave()
+        self._first.clear()
+        if self._on_loss is None or (self._writer is None and not is_full(fault)):
+            raise fault
+        self._on_loss(fault)
 
     def _origins(self) -> Origins:
         nodes = self._bus.nodes if self._bus is not None else ()
@@ -121,8 +151,11 @@ class BagTap:
         self._types.setdefault(message.topic, msgtype)
         if self._writer is None and (not self._first or message.log_ns == self._first[0].log_ns):
             self._first.append(message)
-        else:
+            return
+        try:
             self._write(self._writer or self._begin(), message)
+        except RecordingError as fault:
+            self._lose(fault)
 
     def _begin(self) -> BagWriter:
         self._writer = writer = BagWriter(self.folder, self._config)

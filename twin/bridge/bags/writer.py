@@ -113,6 +113,11 @@ class BagWriter:
         self._storage.close(info)
         metadata.write(self.folder, info)
 
+    def leave(self) -> None:
+        """Let it be as it is, without an end: the bag of a process that was killed. Harmless when closed."""
+        self._closed = True
+        self._storage.leave()
+
     def __enter__(self) -> Self:
         return self
 

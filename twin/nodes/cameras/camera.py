@@ -113,6 +113,11 @@ class CameraPublisher:
         """Absolute name of the topic of its depth images; empty if it makes none."""
         return self._publishers["depth"].name if "depth" in self._publishers else ""
 
+    @property
+    def truths(self) -> list[str]:
+        """Absolute names of topics of ground truth that eyes can see: labels in colours, boxes."""
+        return [self._publishers[what].name for what in ("colored", "boxes") if what in self._publishers]
+
     def publish(self, time_ns: int) -> None:
         """Look at `time_ns`, if anybody wants to see, and publish, stamped with it.
 

@@ -43,6 +43,8 @@ class Context:
     """By topic: what makes the pictures there."""
     images_period: Period | None
     """At its multiples [ns] pictures are kept; None: at no time."""
+    truths: Collection[str] = ()
+    """Topics of what cameras of ground truth tell: labels in colours, and boxes."""
     images: Literal["jpeg", "h264"] = "jpeg"
     """As what."""
     pictures: set[str] = field(default_factory=set)

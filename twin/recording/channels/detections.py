@@ -56,9 +56,13 @@ class DetectionChannel(Channel[Found]):
         found = [self.outline(each) for each in message.detections]
         outlines = tuple(np.concatenate((points, points[:1])).astype(np.float32) for points, _ in found)
         names = tuple(name for _, name in found)
-        for topic, frame in self.context.seen_from.items():
-            if frame == message.header.frame_id and self.context.frames.split(topic)[0] == self.namespace:
-                self.rows.append(Found(sample.time_ns, topic, outlines, names))
+        for topic in self.over(message.header.frame_id):
+            self.rows.append(Found(sample.time_ns, topic, outlines, names))
+
+    def over(self, frame: str) -> list[str]:
+        """Return topics of pictures that a frame sees, of the same robot."""
+        seen, split = self.context.seen_from, self.context.frames.split
+        return [topic for topic in seen if seen[topic] == frame and split(topic)[0] == self.namespace]
 
     @abstractmethod
     def outline(self, detection: Any) -> tuple[NDArray[np.float64], str]:
@@ -68,7 +72,7 @@ class DetectionChannel(Channel[Found]):
         """Yield the outlines, camera by camera."""
         for topic in sorted({row.picture for row in rows}):
             seen = [row for row in rows if row.picture == topic]
-            entity = f"{picture_entity(topic)}{self.topic}"
+            entity = f"{picture_entity(topic)}{'' if topic == self.topic else self.topic}"
             if topic not in self._declared:
                 self._declared.add(topic)
                 look = rr.LineStrips2D.from_fields(

@@ -18,7 +18,7 @@ from twin.recording.mounted import Mounted
 if TYPE_CHECKING:
     from twin.bridge.topics import Sample
 
-_BLOB, _MEDIA_TYPE = (Component(rr.EncodedImage, name) for name in ("blob", "media_type"))
+BLOB, MEDIA_TYPE = (Component(rr.EncodedImage, name) for name in ("blob", "media_type"))
 _PLANE_M = 0.3
 """Distance from the camera at which a picture hangs in the view of space [m]."""
 
@@ -71,7 +71,7 @@ class PictureChannel(Channel[tuple[int, str, NDArray[np.uint8]]]):
             if frames:
                 yield self.entity, sim_time([frame.time_ns for frame in frames]), columns(frames)
             return
-        yield self.entity, sim_time(times), (_BLOB.column(list(files)), _MEDIA_TYPE.column(list(kinds)))
+        yield self.entity, sim_time(times), (BLOB.column(list(files)), MEDIA_TYPE.column(list(kinds)))
 
     def _mount(self, camera: Mounted) -> None:
         lens, pose, place = camera.lens, camera.T_body_optical, f"camera of {self.topic}"

@@ -25,6 +25,7 @@ from twin.recording.channels.spatial import (
     PoseArrayChannel,
     ScanChannel,
 )
+from twin.recording.channels.truth import KINDS
 from twin.recording.channels.voxels import VoxelChannel
 from twin.recording.frames import Frames
 
@@ -62,7 +63,7 @@ SHOWN_TYPES = frozenset(_BY_TYPE) | {msgtype for _, msgtype in _BY_NAME}
 
 def open_channel(context: Context, topic: str, msgtype: str) -> Channel[Any] | None:
     """Return how a topic is drawn, or None for a topic that a recording does not show."""
-    kind = kind_of(context.frames, topic, msgtype)
+    kind = KINDS[msgtype] if topic in context.truths else kind_of(context.frames, topic, msgtype)
     return None if kind is None else kind(context, context.frames.split(topic)[0], topic)
 
 

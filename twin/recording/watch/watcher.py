@@ -28,6 +28,7 @@ from twin.recording.channels.pictures import PictureChannel
 from twin.recording.columns import send
 from twin.recording.extents import Floor
 from twin.recording.map_eye import declare_map_eye
+from twin.recording.read_back import WATCH
 from twin.recording.stream import begin_flush, declare_up, end_recording, flush, handed_over, open_recording
 from twin.recording.watch.channels import TEXT, TextChannel, kinds_of
 from twin.recording.watch.frame_tree import FrameTree, GraphFrames
@@ -161,7 +162,7 @@ class Watcher:
         """
         self._time = GraphTime(self._now_ns(), simulated=self._sim_time.now_ns > 0)
         blueprint = graph_layout(self._floor, ["robot"], (), (), (), {})
-        self._recording = open_recording(target, "twin-watch", "graph", blueprint, screen)
+        self._recording = open_recording(target, WATCH, "graph", blueprint, screen)
         self._target, self._screen = target, screen
         declare_up(self._recording)
         declare_map_eye(self._recording, *self._floor)

@@ -16,6 +16,7 @@ from xxhash import xxh3_128
 from twin.convert.sensors import add_camera
 from twin.errors import SimulationError
 from twin.models.specs import CameraSpec
+from twin.sim.cameras.enclosure import enclosing
 from twin.sim.canvas import Canvas
 from twin.sim.compose import GROUP_COLLISION, GROUP_PAINT, GROUP_VISUAL
 
@@ -83,6 +84,7 @@ class Eyes:
             id(camera): [self._view(f"camera {number}.{side}") for side in range(len(camera.source.turns))]
             for number, camera in enumerate(cameras)
         }
+        self._enclosed: set[int] = set()
         self._step = -1
         self.drawn = 0
         """How many pictures."""
@@ -106,6 +108,7 @@ class Eyes:
             SimulationError: The process is a fork of the one that opened the canvas.
         """
         near, far = self._turn_to(camera)
+        self._look_around(camera)
         self.drawn += colours + depth
         size, seen, distances = camera.source.size, _NO_COLOURS, _NO_DEPTH
         if colours:
@@ -145,6 +148,7 @@ class Eyes:
             SimulationError: The process is a fork of the one that opened the canvas.
         """
         self._turn_to(camera)
+        self._look_around(camera)
         self.drawn += 1
         size, views = camera.source.size, self._views_of(camera, paint=True)
         found = _below([_shown(scene)[self._canvas.numbers(scene, *size)] for scene in views])
@@ -179,6 +183,21 @@ class Eyes:
         clip, extent = self.model.vis.map, self.model.stat.extent
         clip.znear, clip.zfar = near / extent, far / extent
         return near, far
+
+    def _look_around(self, camera: Camera) -> None:
+        """Tell, once for each camera, that it has come into something that is not of its own robot."""
+        if id(camera) in self._enclosed:
+            return
+        world, name = self._world, camera.mount.robot
+        point = self._data.cam_xpos[self._views[id(camera)][0].fixedcamid]
+        for geom in enclosing(world.model, world.data, point):
+            owners, robots = world.geom_owners(world.model)
+            owner = owners[geom] if robots[geom] < 0 else list(world.robots)[robots[geom]]
+            if owner != name:
+                self._enclosed.add(id(camera))
+                said = f"camera '{camera.spec.name}' of {name} is inside {owner}"
+                _LOG.warning("%s: its pictures show what is behind it", said)
+                return
 
     def _views_of(self, camera: Camera, *, paint: bool) -> Iterator[mujoco.MjvScene]:
         """Yield what is to be drawn, view by view; paint has no depth, as it is nothing to rays."""

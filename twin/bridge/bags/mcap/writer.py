@@ -107,6 +107,10 @@ class McapWriter:
         finally:
             self._output.close()
 
+    def leave(self) -> None:
+        """Close the file without an end."""
+        self._output.close()
+
     def _tell(self, info: BagInfo) -> None:
         self.flush()
         self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata.to_yaml(info)})
