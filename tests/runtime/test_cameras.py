@@ -146,12 +146,16 @@ def test_a_compressed_depth_is_that_of_the_image(scenario: Load) -> None:
 
 
 @needs_opengl
-def test_depth_in_millimetres_is_zero_where_there_is_none(scenario: Load, tmp_path: Path) -> None:
+def test_depth_in_millimetres_is_zero_where_there_is_none(
+    scenario: Load, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And a camera beside it that cannot be is left out, which is told."""
     robot = tmp_path / "mast.urdf"
     robot.write_text(
         "<robot name='mast'><link name='base'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/>"
         "</inertial></link><gazebo reference='base'><sensor name='eye' type='depth_camera'>"
         "<pose>0 0 0.5 0 0 0</pose><camera><image><width>16</width><height>12</height><format>L16</format>"
+        "</image></camera></sensor>\n<sensor name='huge' type='camera'><camera><image><width>20000</width>"
         "</image></camera></sensor></gazebo></robot>"
     )
     run = OpenRun(
@@ -169,8 +173,13 @@ def test_depth_in_millimetres_is_zero_where_there_is_none(scenario: Load, tmp_pa
     assert (millimetres[:6] == 0).all()
     f = 8.0 / np.tan(1.047 / 2.0)
     assert abs(int(millimetres[11, 3]) - round(500.0 * f / 5.5)) <= 1
-    tree = [s for s in run.run.bus.nodes if s.name == "eye_driver"]
-    assert tree
+    drivers = [node.name for node in run.run.bus.nodes if node.name.endswith("_driver")]
+    assert drivers == ["eye_driver"]
+    (told,) = (record.getMessage() for record in caplog.records if record.levelname == "WARNING")
+    assert told == (
+        f"{robot}:2: sensor 'huge' of type camera is left out: an image of 20000 x 240 pixels; "
+        "valid are whole numbers from 1 to 8192"
+    )
     run.close()
 
 
