@@ -183,6 +183,23 @@ def test_depth_in_millimetres_is_zero_where_there_is_none(
     run.close()
 
 
+@needs_opengl
+def test_a_robot_before_a_rack_sees_which_bay_it_is(scenario: Load) -> None:
+    run = OpenRun(
+        scenario(
+            "name: bay\nduration: 0.2 s\nworld: {arena: warehouse}\n"
+            "robots: [{model: diff_bot, args: {camera: camera}, pose: {x: 0.2, y: 2.4, yaw: 90 deg},"
+            " apriltag: {size: 12 cm}}]\nchecks: [{no_collision: {}}]\n"
+        ),
+        record=False,
+    )
+    seen: list[Any] = []
+    run.run.bus.tap(lambda sample: seen.append(sample.message) if sample.topic == "/detections" else None)
+    run.advance()
+    assert {one.id for message in seen for one in message.detections} == {101}
+    run.close()
+
+
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)

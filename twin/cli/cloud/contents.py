@@ -98,7 +98,7 @@ def clusters(
         return
     from twin.cli.console import print_table
 
-    columns = ("cluster", "points", "centroid x, y, z [m]", "size x, y, z [m]")
+    columns = ("cluster", "points", "centroid in m", "size in m")
     print_table(
         columns,
         [
