@@ -146,12 +146,16 @@ def test_a_compressed_depth_is_that_of_the_image(scenario: Load) -> None:
 
 
 @needs_opengl
-def test_depth_in_millimetres_is_zero_where_there_is_none(scenario: Load, tmp_path: Path) -> None:
+def test_depth_in_millimetres_is_zero_where_there_is_none(
+    scenario: Load, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And a camera beside it that cannot be is left out, which is told."""
     robot = tmp_path / "mast.urdf"
     robot.write_text(
         "<robot name='mast'><link name='base'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/>"
         "</inertial></link><gazebo reference='base'><sensor name='eye' type='depth_camera'>"
         "<pose>0 0 0.5 0 0 0</pose><camera><image><width>16</width><height>12</height><format>L16</format>"
+        "</image></camera></sensor>\n<sensor name='huge' type='camera'><camera><image><width>20000</width>"
         "</image></camera></sensor></gazebo></robot>"
     )
     run = OpenRun(
@@ -169,8 +173,30 @@ def test_depth_in_millimetres_is_zero_where_there_is_none(scenario: Load, tmp_pa
     assert (millimetres[:6] == 0).all()
     f = 8.0 / np.tan(1.047 / 2.0)
     assert abs(int(millimetres[11, 3]) - round(500.0 * f / 5.5)) <= 1
-    tree = [s for s in run.run.bus.nodes if s.name == "eye_driver"]
-    assert tree
+    drivers = [node.name for node in run.run.bus.nodes if node.name.endswith("_driver")]
+    assert drivers == ["eye_driver"]
+    (told,) = (record.getMessage() for record in caplog.records if record.levelname == "WARNING")
+    assert told == (
+        f"{robot}:2: sensor 'huge' of type camera is left out: an image of 20000 x 240 pixels; "
+        "valid are whole numbers from 1 to 8192"
+    )
+    run.close()
+
+
+@needs_opengl
+def test_a_robot_before_a_rack_sees_which_bay_it_is(scenario: Load) -> None:
+    run = OpenRun(
+        scenario(
+            "name: bay\nduration: 0.2 s\nworld: {arena: warehouse}\n"
+            "robots: [{model: diff_bot, args: {camera: camera}, pose: {x: 0.2, y: 2.4, yaw: 90 deg},"
+            " apriltag: {size: 12 cm}}]\nchecks: [{no_collision: {}}]\n"
+        ),
+        record=False,
+    )
+    seen: list[Any] = []
+    run.run.bus.tap(lambda sample: seen.append(sample.message) if sample.topic == "/detections" else None)
+    run.advance()
+    assert {one.id for message in seen for one in message.detections} == {101}
     run.close()
 
 

@@ -19,6 +19,9 @@ from twin.bridge.qos import SENSOR_DATA
 from twin.clouds.deskewing import deskewed
 from twin.clouds.points import coordinates, transformed
 from twin.geometry import Pose3
+from twin.models.loader import load
+from twin.models.options import ReadOptions
+from twin.models.shapes import Cylinder
 from twin.recording.digest import RunDigest
 from twin.recording.read_back import read
 from twin.runtime.open_run import OpenRun
@@ -58,6 +61,18 @@ def poses(monkeypatch: pytest.MonkeyPatch) -> Poses:
 
     monkeypatch.setattr(MultiLayerLidar, "_cast", noted)
     return found
+
+
+def test_the_lidar_stands_on_a_mast_that_is_seen_only() -> None:
+    robot = load("jackal", ReadOptions(args={"velodyne": "true"}))
+    link = robot.links["velodyne"]
+    lows = [
+        float(shape.T_link_geometry.xyz[2]) - shape.geometry.length / 2.0
+        for shape in link.visuals
+        if isinstance(shape.geometry, Cylinder)
+    ]
+    assert min(lows) == pytest.approx(-0.25)  # the deck
+    assert not link.collisions
 
 
 def run_of(

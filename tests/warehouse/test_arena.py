@@ -267,6 +267,42 @@ def test_a_misspelt_key_is_named(tmp_path: Path) -> None:
         arenas.load(file)
 
 
+def test_each_bay_has_a_tag_to_the_right_of_its_sign(warehouse: Arena) -> None:
+    found = {decal.name: decal for decal in warehouse.decals}
+    tags = [name for name in found if " tag " in name]
+    assert sorted(int(name.rpartition(" ")[2]) for name in tags) == [
+        first + number for first in (100, 200, 300) for number in range(4)
+    ]
+    for sign, tag in (("1 front", 100), ("2 front", 101), ("1 back", 102), ("2 back", 103)):
+        one, other = found[f"rack_a {sign}"], found[f"rack_a tag {tag}"]
+        aside = (one.T_body_decal.inverse() @ other.T_body_decal).xyz  # x to the right, y up
+        assert aside == pytest.approx([0.16 + 0.05 + 0.08, 0, 0])
+        assert other.size == pytest.approx((0.15, 0.15))  # 12 cm, and as much white as a module is wide
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        (
+            "first_tag: 584",
+            "the tags of rack 'rack_b', 584 to 587, are not all of tag36h11; its ids end at 586",
+        ),
+        (
+            "first_tag: 103",
+            "the tags of rack 'rack_b', 103 to 106, are also on rack 'rack_a'; choose another",
+        ),
+        ("first_tag: 200, bay: 60 cm", "a bay of rack 'rack_b' is 0.6 m wide and has no room for a tag"),
+    ],
+)
+def test_tags_that_cannot_be_are_refused_with_their_line(tmp_path: Path, key: str, said: str) -> None:
+    file, text = tmp_path / "hall.yaml", catalogue()["warehouse"].read_text(encoding="utf-8")
+    file.write_text(text.replace("first_tag: 200", key), encoding="utf-8")
+    with pytest.raises(ScenarioError) as caught:
+        arenas.load(file)
+    (problem,) = caught.value.problems
+    assert (problem.line, problem.message[: len(said)]) == (17, said)
+
+
 def test_all_that_is_painted_lies_on_what_it_is_painted_on(warehouse: Arena) -> None:
     scene = warehouse.scene(NAMED, seed=1)
     bodies = (*scene.statics, *scene.goods)

@@ -21,6 +21,8 @@ from twin.models.specs import CameraSpec, SensorSpec
 
 LENS_ALONG_X = (0.5, 0.5, -0.5, -0.5)
 """MuJoCo's cameras look along -z with +y up, Gazebo's along +x with +z up."""
+_PIXEL = 1e-5
+"""MuJoCo wants one for an axis beside the middle; how large it is changes no image [m]."""
 _TYPE, _OBJECT = mujoco.mjtSensor, mujoco.mjtObj
 STATE_SENSORS = {
     "position": _TYPE.mjSENS_JOINTPOS,
@@ -91,8 +93,10 @@ class SensorBuilder:
 
     def _camera(self, camera: CameraSpec) -> str:
         name = self._free(camera.name)
-        size = camera.width, camera.height
-        add_camera(self.spec.body(camera.link), name, camera.T_link_sensor, size, camera.lens.focal_length)
+        lens, size = camera.lens, (camera.width, camera.height)
+        add_camera(
+            self.spec.body(camera.link), name, camera.T_link_sensor, size, lens.focal_lengths, lens.centre
+        )
         return name
 
     def _free(self, name: str) -> str:
@@ -103,7 +107,12 @@ class SensorBuilder:
 
 
 def add_camera(
-    body: mujoco.MjsBody, name: str, pose: Pose3, size: tuple[int, int], focal_length: float
+    body: mujoco.MjsBody,
+    name: str,
+    pose: Pose3,
+    size: tuple[int, int],
+    focal_lengths: tuple[float, float],
+    centre: tuple[float, float],
 ) -> None:
     """Add a pinhole camera to the body of its link.
 
@@ -112,15 +121,21 @@ def add_camera(
         name: In the model.
         pose: In the link; it looks along +x.
         size: Width and height of its image [pixels].
-        focal_length: [pixels]
+        focal_lengths: Along u and v [pixels].
+        centre: Where its axis meets the image [pixels].
     """
-    body.add_camera(
+    camera = body.add_camera(
         name=name,
         pos=pose.xyz,
         quat=multiply_wxyz(pose.quat_wxyz, LENS_ALONG_X),
-        fovy=math.degrees(2.0 * math.atan(size[1] / 2.0 / focal_length)),
+        fovy=math.degrees(2.0 * math.atan(size[1] / 2.0 / focal_lengths[1])),
         resolution=size,
     )
+    u, v = (at - (count - 1) / 2.0 for at, count in zip(centre, size, strict=True))
+    if u or v or focal_lengths[0] != focal_lengths[1]:
+        camera.sensor_size = [_PIXEL * count for count in size]
+        camera.focal_pixel = focal_lengths
+        camera.principal_pixel = -u, -v
 
 
 def _described(sensor: SensorSpec, names: list[str]) -> dict[str, Any]:

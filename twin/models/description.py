@@ -157,6 +157,11 @@ class RobotDescription:
     self_collide: bool | None = None
     """Whether links that do not say touch each other, from `<gazebo><self_collide>`; None: not said."""
 
+    @property
+    def left_out(self) -> tuple[Problem, ...]:
+        """Why sensors of the file are none."""
+        return tuple(warning for warning in self.warnings if warning.code == "not-simulated")
+
     @cached_property
     def outwards(self) -> tuple[Joint, ...]:
         """The joints that can be reached from the root, each after the one above it, breadth first."""

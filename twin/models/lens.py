@@ -21,7 +21,7 @@ _CLOSE = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Lens:
-    """A pinhole of square pixels, with the distortion model `plumb_bob` (Brown 1966)."""
+    """A pinhole with the distortion model `plumb_bob` (Brown 1966)."""
 
     width: int
     """[pixels]"""
@@ -31,22 +31,37 @@ class Lens:
     """Full angle [rad] that the image would have without distortion."""
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """k1, k2, p1, p2, k3, in the order of CameraInfo's D."""
+    intrinsics: tuple[float, float, float, float] | None = None
+    """fx, fy, cx, cy [pixels], if the field of view does not tell them: of pixels that are not square, or an
+    axis beside the middle."""
+
+    @property
+    def focal_lengths(self) -> tuple[float, float]:
+        """Along u and v [pixels]."""
+        if self.intrinsics is not None:
+            return self.intrinsics[:2]
+        return (self.width / 2.0 / math.tan(self.horizontal_fov / 2.0),) * 2
 
     @property
     def focal_length(self) -> float:
-        """[pixels], the same both ways."""
-        return self.width / 2.0 / math.tan(self.horizontal_fov / 2.0)
+        """Along u, in which two views of a scene differ [pixels]."""
+        return self.focal_lengths[0]
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Of the image [pixels]."""
+        return (self.width - 1) / 2.0, (self.height - 1) / 2.0
 
     @property
     def centre(self) -> tuple[float, float]:
         """Where the optical axis meets the image [pixels]."""
-        return (self.width - 1) / 2.0, (self.height - 1) / 2.0
+        return self.middle if self.intrinsics is None else self.intrinsics[2:]
 
     @property
     def matrix(self) -> Array:
         """K of CameraInfo, shape (3, 3)."""
-        f, (cx, cy) = self.focal_length, self.centre
-        return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+        (fx, fy), (cx, cy) = self.focal_lengths, self.centre
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     @property
     def model(self) -> tuple[str, tuple[float, ...]]:
@@ -64,7 +79,7 @@ class Lens:
 
     def rays(self) -> Array:
         """Return the x and y on the plane z = 1 of what each pixel sees, shape (height, width, 2)."""
-        (cx, cy), f = self.centre, self.focal_length
+        (cx, cy), f = self.centre, self.focal_lengths
         seen = np.stack(np.meshgrid(np.arange(self.width) - cx, np.arange(self.height) - cy), axis=-1) / f
         return self.undistorted(seen.reshape(-1, 2)).reshape(seen.shape)
 
@@ -100,4 +115,4 @@ class Lens:
         return found
 
     def _pixels(self, points: Array) -> Array:
-        return points * self.focal_length + self.centre
+        return points * self.focal_lengths + self.centre

@@ -167,6 +167,8 @@ class CameraSpec(SensorSpec):
     """Clipping distance [m]."""
     far: float
     """Clipping distance [m]."""
+    depth_range: tuple[float, float] | None = None
+    """Between which depths are told, if the file says so besides the clipping distances [m]."""
     noise_stddev: float = 0.0
     """Of a pixel's value, from 0 to 1."""
     noise_mean: float = 0.0
@@ -187,6 +189,10 @@ class CameraSpec(SensorSpec):
     depth_noise: DepthNoise | None = None
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """Of `Lens`."""
+    intrinsics: tuple[float, float, float, float] | None = None
+    """Likewise."""
+    baseline: float = 0.0
+    """How far it is to the right of the left camera of a stereo pair, as CameraInfo's P tells it [m]."""
     exposure: Exposure | None = None
     """None: pictures are as bright as they are drawn."""
     wide: WideLens | None = None
@@ -200,4 +206,5 @@ class CameraSpec(SensorSpec):
             height=self.height,
             horizontal_fov=self.horizontal_fov,
             distortion=self.distortion,
+            intrinsics=self.intrinsics,
         )

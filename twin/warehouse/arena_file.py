@@ -12,9 +12,16 @@ from pydantic import Field, model_validator
 from twin.errors import nearest
 from twin.geometry import Pose2
 from twin.parameters import Kilograms, Metres, Radians
+from twin.perception.tags.families import FAMILIES
 from twin.strict_yaml import Fault, Faults, StrictModel
 from twin.warehouse.footprint import Rectangle, overlap
 
+RACK_TAGS: Literal["tag36h11"] = "tag36h11"
+"""The family of those on racks; it is printed without OpenCV."""
+TAG_SHARE = 0.75
+"""Size of a tag for each metre of the sign beside it."""
+TAG_GAP = 0.05
+"""From the sign to what is beside it [m]."""
 Length = Annotated[Metres, Field(gt=0.0)]
 Point = tuple[Metres, Metres]
 PoseList = tuple[Metres, Metres, Radians]
@@ -82,6 +89,19 @@ class RackEntry(StrictModel):
     """Distance of the uprights."""
     headroom: Length = 0.35
     """Height of the uprights above the highest surface."""
+    first_tag: Annotated[int, Field(ge=0)] | None = None
+    """Id of the AprilTag (`tag36h11`) beside the sign of the first bay, the next ones of the others: those in
+    front, then those behind, each from left to right as seen from the front. Absent: no tags."""
+
+    @property
+    def bays(self) -> int:
+        """How many there are."""
+        return max(1, round(self.length / self.bay))
+
+    @property
+    def sign_height(self) -> float:
+        """Of the sign on each bay, which is twice as wide, and of the tag with its white border [m]."""
+        return min(0.16, 0.7 * self.levels[0])
 
 
 class PalletEntry(StrictModel):
@@ -200,7 +220,7 @@ class ArenaFile(StrictModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> ArenaFile:
-        faults = [*_names(self), *_racks(self), *_totes(self), *_places(self), *_overlaps(self)]
+        faults = [*_names(self), *_racks(self), *_tags(self), *_totes(self), *_places(self), *_overlaps(self)]
         if faults:
             raise Faults(faults)
         return self
@@ -244,6 +264,28 @@ def _racks(arena: ArenaFile) -> Iterator[Fault]:
         if (depth := max(kind.inset + kind.depth for kind in kinds)) > rack.depth:
             text = f"a tote needs {depth:g} m of depth and rack '{name}' has {rack.depth:g} m"
             yield Fault(("racks", name, "depth"), text)
+
+
+def _tags(arena: ArenaFile) -> Iterator[Fault]:
+    total, taken = FAMILIES[RACK_TAGS].total, dict[int, str]()
+    for name, rack in arena.racks.items():
+        if rack.first_tag is None:
+            continue
+        first, last = rack.first_tag, rack.first_tag + 2 * rack.bays - 1
+        here = f"the tags of rack '{name}', {first} to {last},"
+        other = next((taken[number] for number in range(first, last + 1) if number in taken), None)
+        needed = 2.0 * (2.0 * rack.sign_height + TAG_GAP)  # the sign is in the middle
+        if last >= total:
+            text = f"{here} are not all of {RACK_TAGS}; its ids end at {total - 1}"
+            yield Fault(("racks", name, "first_tag"), text)
+        elif other is not None:
+            text = f"{here} are also on rack '{other}'; choose another first_tag"
+            yield Fault(("racks", name, "first_tag"), text)
+        elif rack.length / rack.bays < needed:
+            text = f"a bay of rack '{name}' is {rack.length / rack.bays:g} m wide and has no room for a tag "
+            text += f"beside its sign; bay must be at least {needed:.3g}"
+            yield Fault(("racks", name, "first_tag"), text)
+        taken.update(dict.fromkeys(range(first, last + 1), name))
 
 
 def _totes(arena: ArenaFile) -> Iterator[Fault]:

@@ -19,9 +19,18 @@ from twin.geometry import Pose2, Pose3
 from twin.models.shapes import Box, Cylinder
 from twin.sim.looks import materials
 from twin.sim.looks.kept_pictures import kept_picture
+from twin.sim.looks.tags import tag_decal
 from twin.sim.noise import NoiseStream
 from twin.sim.scene import Decal, FreeBody, Rgba, Shape, StaticBody
-from twin.warehouse.arena_file import CylindersEntry, PartitionEntry, RackEntry, ToteKind
+from twin.warehouse.arena_file import (
+    RACK_TAGS,
+    TAG_GAP,
+    TAG_SHARE,
+    CylindersEntry,
+    PartitionEntry,
+    RackEntry,
+    ToteKind,
+)
 
 if TYPE_CHECKING:
     from twin.warehouse.arena import Arena
@@ -102,7 +111,7 @@ def structure(arena: Arena) -> Iterator[StaticBody]:
 
 
 def decals(arena: Arena) -> Iterator[Decal]:
-    """Yield what is painted on the floor, and a sign with a number on each bay of a rack, front and back."""
+    """Yield what is painted on the floor, and signs and tags on each bay of a rack, front and back."""
     if arena.file.hall.walls:
         hall = arena.hall
         yield Decal(
@@ -112,21 +121,31 @@ def decals(arena: Arena) -> Iterator[Decal]:
             paint=partial(_floor, arena),
         )
     for letter, (name, entry) in zip(ascii_uppercase, arena.file.racks.items(), strict=False):
-        bays = max(1, round(entry.length / entry.bay))
-        height = min(0.16, 0.7 * entry.levels[0])
+        bays, height = entry.bays, entry.sign_height
         z = min(entry.levels[0] / 2.0, 0.25)
         for bay in range(bays):
             along = ((bay + 0.5) / bays - 0.5) * (entry.length - _UPRIGHT)
             for yaw in (0.0, math.pi):
                 side = Pose2(*entry.pose) @ Pose2(0.0, 0.0, yaw)
                 out = entry.depth / 2.0 + _STUCK
-                at = Pose3.from_pose2(side @ Pose2(out, along if yaw == 0.0 else -along, 0.0), z)
+                across = along if yaw == 0.0 else -along
+                at = Pose3.from_pose2(side @ Pose2(out, across, 0.0), z)
                 yield Decal(
                     name=f"{name} {bay + 1} {'back' if yaw else 'front'}",
                     size=(2.0 * height, height),
                     T_body_decal=at @ _UPRIGHT_PICTURE,
                     paint=partial(_sign, f"{letter}{bay + 1}"),
                 )
+                if entry.first_tag is not None:
+                    number = entry.first_tag + bay + (bays if yaw else 0)
+                    beside = side @ Pose2(out, across + 1.5 * height + TAG_GAP, 0.0)
+                    yield tag_decal(
+                        name=f"{name} tag {number}",
+                        family=RACK_TAGS,
+                        number=number,
+                        size=TAG_SHARE * height,
+                        T_world_tag=Pose3.from_pose2(beside, z),
+                    )
 
 
 def _floor(arena: Arena) -> NDArray[np.uint8]:
@@ -279,7 +298,7 @@ def rack_body(name: str, rack: RackEntry) -> StaticBody:
     post = (_UPRIGHT, _UPRIGHT, top - lowest)
     shapes += [
         box(post, (side * (depth - _UPRIGHT) / 2.0, float(y), (top + lowest) / 2.0), PALETTE["blue"], "steel")
-        for y in np.linspace(-edge, edge, max(1, round(length / rack.bay)) + 1)
+        for y in np.linspace(-edge, edge, rack.bays + 1)
         for side in (-1.0, 1.0)
     ]
     return _body(name, Pose2(*rack.pose), *shapes)

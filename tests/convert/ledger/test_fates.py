@@ -63,7 +63,8 @@ EVERYTHING = f"""<robot name="all" version="1.0">
     </imu></sensor>
   <sensor name="eye" type="camera"><camera name="e"><horizontal_fov>1</horizontal_fov><image><width>4</width>
     <height>3</height><format>R8G8B8</format></image><clip><near>1</near><far>2</far></clip><noise>
-    <type>gaussian</type><stddev>0.1</stddev></noise></camera></sensor>
+    <type>gaussian</type><stddev>0.1</stddev></noise><lens><intrinsics><fx>3</fx><fy>2</fy></intrinsics></lens>
+    </camera></sensor>
   <sensor name="bump" type="contact"><contact><collision>c</collision></contact></sensor>
   <sensor name="high" type="altimeter"><altimeter/></sensor>
   <sensor name="bare" type="camera"/><sensor/></gazebo>
@@ -123,6 +124,7 @@ DEMANDED: dict[str, tuple[str, str]] = {
     "sensor 'eye'/camera/horizontal_fov": ("translated", "fovy"),
     "sensor 'eye'/camera/clip/near": ("dropped", "alike"),
     "sensor 'eye'/camera/noise": ("dropped", ""),
+    "sensor 'eye'/camera/lens/intrinsics/fx": ("translated", "focalpixel"),
     "sensor 'bump'/contact/collision": ("dropped", "every shape"),
     "sensor 'high'": ("dropped", "altimeter"),
     "sensor 'bare'": ("dropped", "camera"),

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from twin.bridge.msgs import Header, new
 from twin.errors import ModelError
 from twin.models.checks import check
 from twin.models.lens import Lens
 from twin.models.loader import parse_urdf
 from twin.models.optical_frames import optical_frame
 from twin.models.specs import CameraSpec, CameraTopics, DepthNoise, Exposure
+from twin.nodes.cameras.messages import camera_info
 
 
 def camera(inside: str = "", *, kind: str = "camera", after: str = "", more: str = "") -> CameraSpec:
@@ -46,6 +48,8 @@ KINECT = (
         ("camera", "", {}),
         ("camera", "<topic>f/image_raw</topic>", {"image": "f/image_raw", "info": "f/camera_info"}),
         ("camera", "<topic>/picture</topic>", {"image": "picture", "info": "camera_info"}),
+        ("camera", "<topic>f/image</topic>", {"image": "f/image", "info": "f/info"}),
+        ("depth_camera", "<topic>f/image</topic>", {"depth": "f/image", "depth_info": "f/info"}),
         ("depth_camera", "<topic>d/z</topic>", {"depth": "d/z", "depth_info": "d/camera_info"}),
         ("depth_camera", "<topic>d/z</topic>", {"points": "d/z/points"}),
         ("rgbd_camera", "<topic>head</topic>", {"image": "head/image_raw", "points": "head/depth/points"}),
@@ -58,7 +62,8 @@ KINECT = (
     ],
 )  # fmt: skip
 def test_topics(kind: str, after: str, topics: dict[str, str]) -> None:
-    found = camera(kind=kind, after=after).topics
+    told = "<camera_info_topic>/f/info</camera_info_topic>" if "f/info" in topics.values() else ""
+    found = camera(told, kind=kind, after=after).topics
     assert {name: getattr(found, name) for name in topics} == topics
     if not topics:
         assert found == CameraTopics.below("eye")
@@ -96,9 +101,6 @@ WIDE = "wideanglecamera"
 @pytest.mark.parametrize(
     ("inside", "kind", "says"),
     [
-        ("<image><width>0</width></image>", "camera", "0 x 240 pixels; valid are whole numbers from 1 to"),
-        ("<image><height>20000</height></image>", "camera", "an image of 320 x 20000 pixels"),
-        ("<image><width>9.5</width></image>", "camera", "an image of 9.5 x 240 pixels"),
         ("<clip><near>2</near><far>1</far></clip>", "camera", "sees from 2 to 1 m; valid is 0 < near < far"),
         ("<noise><stddev>-1</stddev></noise>", "camera", "a deviation is not negative"),
         (
@@ -110,7 +112,6 @@ WIDE = "wideanglecamera"
         ("<exposure><gain>0</gain></exposure>", "camera", "an exposure that cannot be; valid are gain and"),
         ("<exposure type='auto'><target>1</target></exposure>", "camera", "max_gain, 0 < target < 1"),
         ("<exposure><lag>-1</lag></exposure>", "camera", "an exposure whose lag or read_noise is negative"),
-        ("<image><width>20000</width></image>", WIDE, "an image of 20000 x 240 pixels"),
         ("<lens><type>fish</type></lens>", WIDE, "a <lens> of type 'fish'; valid are gnomonical,"),
         (
             "<lens><type>custom</type><custom_function><fun>cos</fun></custom_function></lens>",
@@ -125,6 +126,16 @@ WIDE = "wideanglecamera"
         ("<lens><cutoff_angle>4</cutoff_angle></lens>", WIDE, "a <cutoff_angle> of 4 rad; valid is more"),
         ("<lens><env_texture_size>1</env_texture_size></lens>", WIDE, "an <env_texture_size> of 1; valid"),
         ("<lens><intrinsics><fx>9</fx></intrinsics></lens>", WIDE, "<intrinsics> with fx and fy not both"),
+        (
+            "<lens><intrinsics><fx>9</fx><fy>9</fy><s>1</s></intrinsics></lens>",
+            "camera",
+            "has <intrinsics> with fx and fy not both positive, or s not 0",
+        ),
+        (
+            "<depth_camera><clip><far>0.05</far></clip></depth_camera>",
+            "rgbd",
+            "sees from 0.1 to 0.05 m; valid is 0 < near < far",
+        ),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_its_line(inside: str, kind: str, says: str) -> None:
@@ -215,23 +226,98 @@ def test_a_lens_with_intrinsics_or_a_scale_of_its_own_leaves_the_field_of_view()
     assert seen == pytest.approx(np.array([[159.5 + 160 * 2 * 1.5 * np.sin(0.5 / 3 + 0.1), 119.5]]))
 
 
+WIDEST = "a wide-angle camera of this lens has more than 0, at most"
+PIXELS = "valid are whole numbers from 1 to 8192"
+
+
 @pytest.mark.parametrize(
-    ("kind", "fov", "most"),
-    [("equidistant", 6.4, "6.283"), ("equidistant", 0.0, "6.283"), ("orthographic", 3.2, "3.142")],
+    ("kind", "inside", "why", "valid"),
+    [
+        (WIDE, "equidistant", 6.4, f"{WIDEST} 6.283"),
+        (WIDE, "equidistant", 0.0, f"{WIDEST} 6.283"),
+        (WIDE, "orthographic", 3.2, f"{WIDEST} 3.142"),
+        ("camera", "<horizontal_fov>4</horizontal_fov>", "horizontal_fov 4 rad", "a pinhole camera has less"),
+        ("camera", "<image><width>0</width></image>", "an image of 0 x 240 pixels", PIXELS),
+        ("depth", "<image><height>20000</height></image>", "an image of 320 x 20000 pixels", PIXELS),
+        ("camera", "<image><width>9.5</width></image>", "an image of 9.5 x 240 pixels", PIXELS),
+        (WIDE, "<image><width>20000</width></image>", "an image of 20000 x 240 pixels", PIXELS),
+    ],
 )
-def test_a_field_of_view_that_a_wide_lens_has_not_is_told(kind: str, fov: float, most: str) -> None:
-    inside = FISHEYE.format(fov=fov, kind=kind, more="")
+def test_a_camera_that_cannot_be_is_left_out_and_told_with_its_line(
+    kind: str, inside: str, why: str | float, valid: str
+) -> None:
+    if isinstance(why, float):
+        inside, why = FISHEYE.format(fov=why, kind=inside, more=""), f"horizontal_fov {why:g} rad"
     text = (
-        "<robot name='r'><link name='a'/><gazebo reference='a'><sensor name='eye' type='wideanglecamera'>"
-        f"<camera>{inside}</camera></sensor></gazebo></robot>"
+        "<robot name='r'><link name='a'/><gazebo reference='a'>\n"
+        f"<sensor name='eye' type='{kind}'><camera>{inside}</camera></sensor>"
+        "<sensor name='other' type='camera'><camera/></sensor></gazebo></robot>"
     )
     description = parse_urdf(text, Path("r.urdf"))
-    assert description.cameras == ()
-    told = [found.message for found in check(description) if "horizontal_fov" in found.message]
-    assert told == [
-        f"sensor 'eye' of type wideanglecamera: horizontal_fov {fov:g} rad; "
-        f"a wide-angle camera of this lens has more than 0, at most {most}"
-    ]
+    assert [spec.name for spec in description.cameras] == ["other"]
+    (told,) = (found for found in check(description) if found.code == "not-simulated")
+    assert (told.line, told.message) == (2, f"sensor 'eye' of type {kind} is left out: {why}")
+    assert told.fix.startswith(valid)
+
+
+STEREO = """<robot name='r'><link name='a'/><gazebo reference='a'><sensor name='eyes' type='multicamera'>
+<camera name='right'/><camera name='left'/>{after}</sensor></gazebo></robot>"""
+CLASSIC = "<plugin filename='libgazebo_ros_{kind}camera.so'>{inside}</plugin>"
+RENAMED = "<remapping>stereo/left/image_raw:=l</remapping><remapping>image_raw:=both</remapping>"
+
+
+@pytest.mark.parametrize(
+    ("after", "left", "right"),
+    [
+        ("", "eyes_left/image_raw", "eyes_right/image_raw"),
+        ("<topic>pair</topic>", "pair/left/image_raw", "pair/right/image_raw"),
+        (CLASSIC.format(kind="", inside=""), "eyes/left/image_raw", "eyes/right/image_raw"),
+        (
+            CLASSIC.format(
+                kind="",
+                inside=f"<ros><namespace>/demo</namespace>{RENAMED}</ros><camera_name>stereo</camera_name>",
+            ),
+            "l",
+            "demo/stereo/right/image_raw",
+        ),
+        (
+            CLASSIC.format(
+                kind="multi",
+                inside="<cameraName>stereo</cameraName><imageTopicName>image</imageTopicName>",
+            ),
+            "stereo/left/image",
+            "stereo/right/image",
+        ),
+    ],
+)
+def test_each_eye_of_a_multicamera_has_topics_of_its_own(after: str, left: str, right: str) -> None:
+    cameras = parse_urdf(STEREO.format(after=after), Path("r.urdf")).cameras
+    topics = {spec.name: spec.topics for spec in cameras}
+    assert (topics["eyes_left"].image, topics["eyes_right"].image) == (left, right)
+    assert topics["eyes_left"].info != topics["eyes_right"].info
+
+
+@pytest.mark.parametrize("tag", ["hack_baseline", "hackBaseline"])
+def test_the_right_eye_tells_its_baseline(tag: str) -> None:
+    after = CLASSIC.format(kind="", inside=f"<{tag}>0.07</{tag}>")
+    right, left = parse_urdf(STEREO.format(after=after), Path("r.urdf")).cameras
+    header = new(Header)
+    assert camera_info(header, left.lens, left.baseline).p[3] == 0.0
+    p = camera_info(header, right.lens, right.baseline).p.reshape(3, 4)
+    assert p[0, 3] == pytest.approx(-0.07 * p[0, 0])  # as stereo_image_proc wants it
+    assert camera(after=after).baseline == 0.07
+
+
+def test_depth_reaches_as_far_as_the_plugin_says_and_colours_as_far_as_the_clip() -> None:
+    clip = "<clip><near>0.05</near><far>8</far></clip>"
+    after = CLASSIC.format(kind="", inside="<min_depth>0.5</min_depth><max_depth>3.0</max_depth>")
+    both = camera(clip, kind="depth", after=after)
+    assert (both.near, both.far, both.depth_range) == (0.05, 8.0, (0.5, 3.0))
+    alone = camera(clip, kind="depth_camera", after=after)
+    assert (alone.near, alone.far, alone.depth_range) == (0.5, 3.0, None)
+    own = "<depth_camera><clip><far>2</far></clip></depth_camera>"
+    assert camera(clip + own, kind="depth", after=after).depth_range == (0.5, 2.0)
+    assert camera(clip, kind="depth").depth_range is None
 
 
 def test_a_wide_lens_undoes_what_it_does() -> None:

@@ -8,7 +8,7 @@ import pytest
 from tests.drawing import needs_opengl
 from tests.perception.tags.conftest import Photo, before_camera, error_of
 from twin.perception.tags.detector import TagDetector, TagDetectorConfig
-from twin.perception.tags.families import FAMILIES, modules, picture
+from twin.perception.tags.families import FAMILIES, dictionary, modules, picture
 from twin.sim.looks.tags import tag_decal
 
 LENS = "<distortion><k1>-0.25</k1><k2>0.1</k2><k3>0.01</k3><p1>0.002</p1><p2>-0.001</p2></distortion>"
@@ -76,6 +76,13 @@ def test_each_tag_has_its_size_and_the_order_is_that_of_ids(photo: Photo) -> Non
 def test_apriltags_are_the_way_up_that_their_authors_print_them() -> None:
     # The first code of AprilTag 2's table of 36h11, whose rows are read from the top.
     assert int("".join(str(int(bit)) for bit in modules("tag36h11", 0).ravel()), 2) == 0xD5D628584
+
+
+def test_tags_that_are_printed_without_opencv_are_those_of_opencv() -> None:
+    codes = dictionary("tag36h11")
+    theirs = [np.rot90(codes.getBitsFromByteList(row[None], 6), 2) for row in codes.bytesList]
+    assert len(theirs) == FAMILIES["tag36h11"].total
+    assert all((modules("tag36h11", number) == bits).all() for number, bits in enumerate(theirs))
 
 
 def damaged(wrong: int) -> np.ndarray:

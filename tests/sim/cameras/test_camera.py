@@ -64,7 +64,12 @@ def opencv_projection(points: np.ndarray, k: np.ndarray, d: tuple[float, ...]) -
     return np.stack((k[0, 0] * u + k[0, 2], k[1, 1] * v + k[1, 2]), axis=1)
 
 
-@pytest.mark.parametrize("inside", ["", LENS], ids=["pinhole", "lens"])
+INTRINSICS = "<lens><intrinsics><fx>120</fx><fy>150</fy><cx>62</cx><cy>70</cy><s>0</s></intrinsics></lens>"
+
+
+@pytest.mark.parametrize(
+    "inside", ["", LENS, INTRINSICS, LENS + INTRINSICS], ids=["pinhole", "lens", "intrinsics", "both"]
+)
 def test_a_ball_is_seen_where_the_camera_info_says(camera_at: Look, inside: str) -> None:
     camera = camera_at(BALL, inside=inside)
     image = camera.look(0).colours
@@ -73,10 +78,11 @@ def test_a_ball_is_seen_where_the_camera_info_says(camera_at: Look, inside: str)
     v, u = np.nonzero(red)
     assert len(u) > 200
     ahead, left, up = np.array(BALL_AT) - EYE
-    lens = camera.spec.lens
-    edge = opencv_projection(
-        outline(np.array([-left, -up, ahead]), BALL_RADIUS), lens.matrix, lens.distortion
-    )
+    info = camera_info(new(Header), camera.spec.lens)
+    if INTRINSICS in inside:
+        assert info.k.tolist() == [120, 0, 62, 0, 150, 70, 0, 0, 1]
+    ball = np.array([-left, -up, ahead])
+    edge = opencv_projection(outline(ball, BALL_RADIUS), info.k.reshape(3, 3), tuple(info.d))
     assert np.abs(np.array([u.mean(), v.mean()]) - middle(edge)).max() < 0.2
 
 
@@ -166,10 +172,12 @@ def test_the_depth_of_a_wall_is_what_rays_measure(camera_at: Look) -> None:
 
 
 def test_there_is_no_depth_in_the_sky_and_beyond_the_far_plane(camera_at: Look) -> None:
-    view = camera_at(BALL, inside="<depth_camera><clip><far>1.5</far></clip></depth_camera>").look(
-        0, depth=True
-    )
+    inside = "<depth_camera><clip><far>1.5</far></clip></depth_camera>"
+    view, plain = (camera_at(BALL, inside=text).look(0, depth=True) for text in (inside, ""))
     assert view.depth is not None
+    assert view.colours is not None
+    assert plain.colours is not None
+    assert (view.colours == plain.colours).all()  # in which the ball is still seen
     assert np.isnan(view.depth[:60]).all()  # the ball is 2 m away
     assert 0.5 < np.nanmin(view.depth) < np.nanmax(view.depth) <= 1.5
 

@@ -1,4 +1,4 @@
-"""`twin cloud info`, `convert`, `crop` and `voxel`: files of points."""
+"""`twin cloud info`, `convert`, `crop`, `voxel`, `transform` and `deskew`: files of points."""
 
 from __future__ import annotations
 
@@ -95,9 +95,68 @@ def voxel(
     _rewrite(source, output, encoding, lambda points: voxel_grid(points, leaf))
 
 
+def transform(
+    source: Source,
+    output: Output,
+    xyz: Annotated[
+        str,
+        typer.Option("--xyz", metavar="X,Y,Z", help="Where the cloud's frame is in the new one, in metres."),
+    ] = "0,0,0",
+    rpy: Annotated[
+        str,
+        typer.Option(
+            "--rpy", metavar="R,P,Y", help="How it is turned there: roll, pitch and yaw in radians."
+        ),
+    ] = "0,0,0",
+    encoding: Encoding = "binary",
+) -> None:
+    """Write a cloud in another frame; normals turn with it."""
+    from twin.clouds.points import transformed
+    from twin.geometry import Pose3
+
+    T_new_cloud = Pose3.from_xyz_rpy(_finite("--xyz", xyz), _finite("--rpy", rpy))
+    _rewrite(source, output, encoding, lambda points: transformed(points, T_new_cloud))
+
+
+def deskew(
+    source: Source,
+    output: Output,
+    linear: Annotated[
+        str,
+        typer.Option("--linear", metavar="X,Y,Z", help="Velocity of the lidar in its own frame, in m/s."),
+    ] = "0,0,0",
+    angular: Annotated[
+        str, typer.Option("--angular", metavar="X,Y,Z", help="How fast it turned there, in rad/s.")
+    ] = "0,0,0",
+    at: Annotated[
+        float,
+        typer.Option("--at", metavar="S", help="The moment of the new cloud, after its first point."),
+    ] = 0.0,
+    encoding: Encoding = "binary",
+) -> None:
+    """Take the motion of the lidar out of a cloud, by the times of its points and an even velocity."""
+    import numpy as np
+
+    from twin.clouds.deskewing import deskewed_by_twist
+
+    if not math.isfinite(at):
+        raise CloudError(f"--at is {at:g}; valid is a number of seconds")
+    twist = np.array(_finite("--linear", linear)), np.array(_finite("--angular", angular))
+    _rewrite(source, output, encoding, lambda points: deskewed_by_twist(points, *twist, at=at))
+
+
 def _corner(option: str, text: str, instead: float) -> list[float]:
-    if not text:
-        return [instead] * 3
+    return _three(option, text) if text else [instead] * 3
+
+
+def _finite(option: str, text: str) -> list[float]:
+    numbers = _three(option, text)
+    if not all(map(math.isfinite, numbers)):
+        raise CloudError(f"{option} is '{text}'; valid are three finite numbers, as 0.5,-1,0.2")
+    return numbers
+
+
+def _three(option: str, text: str) -> list[float]:
     try:
         x, y, z = (float(word) for word in text.split(","))
     except ValueError:

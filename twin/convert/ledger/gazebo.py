@@ -37,6 +37,11 @@ OF_CAMERAS: Mapping[str, Fate] = MappingProxyType(
         "clip/far": ("dropped", f"MuJoCo clips all cameras alike; {ELSEWHERE}"),
         "image/format": ("dropped", ELSEWHERE),
         "optical_frame_id": ("dropped", ELSEWHERE),
+        "camera_info_topic": ("dropped", ELSEWHERE),
+        "lens/intrinsics/fx": ("translated", "focalpixel"),
+        "lens/intrinsics/fy": ("translated", "focalpixel"),
+        "lens/intrinsics/cx": ("translated", "principalpixel"),
+        "lens/intrinsics/cy": ("translated", "principalpixel"),
         "segmentation_type": ("dropped", ELSEWHERE),
         "box_type": ("dropped", ELSEWHERE),
         **{
@@ -68,7 +73,7 @@ def sensor_fate(element: Element, sensor: Element, link: str, description: Robot
     own = OF_CAMERAS.get(path) if cls is None else cls.fate(path, element, sensor)
     if own is None and len(element) and path not in TAGS:
         return container_fate(element, lambda child: sensor_fate(child, sensor, link, description))
-    if camera and path.startswith("lens/"):
+    if camera and own is None and path.startswith("lens/"):
         return "dropped", f"MuJoCo's cameras are pinholes; {ELSEWHERE}"
     if camera and path.startswith("noise"):
         return "dropped", f"MuJoCo's images are free of noise; {ELSEWHERE}"

@@ -8,7 +8,7 @@ from twin.errors import nearest
 from twin.models.checks.diagnostic import Diagnostic, finding, finding_in, read_source
 from twin.models.description import RobotDescription
 from twin.models.sensors import SENSORS, plugin_of
-from twin.models.urdf.cameras import CAMERA, camera_fault, lenses
+from twin.models.urdf.cameras import CAMERA, lenses
 from twin.models.urdf.commands import HARDWARE, INTERFACES, command_interface, transmissions
 from twin.models.urdf.document import Element, Report, first
 from twin.models.urdf.drives import is_drive, library_of
@@ -98,12 +98,8 @@ def _sensor(sensor: Element, link: str, description: RobotDescription) -> Iterat
 
 
 def _camera(sensor: Element, link: str, what: str) -> Iterator[Found]:
-    faults = [camera_fault(camera) for _, camera in lenses(sensor)]
-    if not faults:
+    if not any(lenses(sensor)):
         yield "not-simulated", sensor, f"{what} has no <camera>", "add <camera>"
-    for fault in faults:
-        if fault:
-            yield "not-simulated", sensor, f"{what}: {fault}", "correct it"
     if "optical" in link:
         message = f"{what} looks along +x of '{link}', which looks by its name along +z"
         fix = "put it on the camera's link, and name the optical frame in <optical_frame_id>"

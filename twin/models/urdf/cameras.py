@@ -86,7 +86,7 @@ _WIDEST = math.pi - 1e-3
 def read_cameras(
     root: Element, links: Mapping[str, Link], report: Report, *, taken: Collection[str]
 ) -> tuple[CameraSpec, ...]:
-    """Return the cameras in file order; those with an impossible field of view are left out.
+    """Return the cameras in file order; those that cannot be are left out, with a warning.
 
     Args:
         root: The `<robot>`.
@@ -97,12 +97,15 @@ def read_cameras(
     cameras: list[CameraSpec] = []
     for link, element in sensor_elements(root, links):
         for name, camera in lenses(element):
-            if camera_fault(camera):
+            fault = _fault(camera)
+            if fault:
+                what = f"sensor '{element.get('name', '')}' of type {kind_of(element)}"
+                report.warn(element, f"{what} is left out: {fault}", code="not-simulated")
                 continue
             spec = _read(element, camera, link, report)
             names = [*taken, *(other.name for other in cameras)]
             own = unique_name(name or spec.name, link, names)
-            topics = _topics(element, own)
+            topics = _topics(element, camera, own)
             if spec.truth is not None:
                 topic = topics.boxes if spec.truth == "boxes" else topics.labels_map
             else:
@@ -115,16 +118,23 @@ def lenses(sensor: Element) -> Iterator[tuple[str, Element]]:
     """Yield each `<camera>` of a camera sensor (a multicamera has several) with the name that it gets."""
     if kind_of(sensor) not in CAMERA:
         return
+    for camera in sensor.findall("camera"):
+        own = _lens_name(sensor, camera)
+        yield f"{sensor.get('name', '')}{own and '_'}{own}", camera
+
+
+def _lens_name(sensor: Element, camera: Element) -> str:
+    """Return what tells one lens of a multicamera from the others; empty if there is one only."""
     found = sensor.findall("camera")
-    several = len(found) > 1
-    for number, camera in enumerate(found):
-        own = camera.get("name") or str(number)
-        yield f"{sensor.get('name', '')}_{own}" if several else str(sensor.get("name", "")), camera
+    return "" if len(found) < 2 else camera.get("name") or str(found.index(camera))
 
 
-def camera_fault(camera: Element) -> str:
-    """Return why a `<camera>` of a sensor is none; empty if it is one."""
+def _fault(camera: Element) -> str:
+    """Return why a `<camera>` of a sensor is none, and what would be one; empty if it is one."""
     fov, sensor = _number(camera, "horizontal_fov"), camera.getparent()
+    width, height = (_number(camera, f"image/{side}") for side in ("width", "height"))
+    if not all(size == int(size) and 1 <= size <= MAX_PIXELS for size in (width, height)):
+        return f"an image of {width:g} x {height:g} pixels; valid are whole numbers from 1 to {MAX_PIXELS}"
     if sensor is not None and kind_of(sensor) == _WIDE:
         return fov_fault(camera, fov)
     if not 0.0 < fov < _WIDEST:
@@ -137,16 +147,15 @@ def _read(sensor: Element, camera: Element, link: str, report: Report) -> Camera
     common = read_common(sensor, link, report, topic="image_raw", rate_hz=30.0)
     common["T_link_sensor"] = common["T_link_sensor"] @ read_pose(camera)
     fov, width, height, near, far, noise, mean = (_number(camera, path) for path in DEFAULTS)
-    width, height = _size(sensor, width, height, report)
-    own = first(camera, "depth_camera/clip")
-    if own is not None:
-        near = _number_at(own, "near", near)
-        far = _number_at(own, "far", far)
-    if not 0.0 < near < far:
-        add_fault(report, sensor, f" sees from {near:g} to {far:g} m; valid is 0 < near < far")
+    sees, format_ = _SEES[kind_of(sensor)], text_of(camera, "image/format") or ""
+    reach = _reach(sensor, camera, near, far) if sees & _DEPTH else (near, far)
+    if not sees & _COLOUR:
+        near, far = reach
+    for low, high in dict.fromkeys(((near, far), reach)):
+        if not 0.0 < low < high:
+            add_fault(report, sensor, f" sees from {low:g} to {high:g} m; valid is 0 < near < far")
     if noise < 0.0:
         add_fault(report, sensor, f" has noise of {noise:g}; a deviation is not negative")
-    sees, format_ = _SEES[kind_of(sensor)], text_of(camera, "image/format") or ""
     coarse = text_of(camera, "depth_camera/format") or (format_ if not sees & _COLOUR else "")
     size = int(width), int(height)
     return CameraSpec(
@@ -154,8 +163,9 @@ def _read(sensor: Element, camera: Element, link: str, report: Report) -> Camera
         horizontal_fov=fov,
         width=size[0],
         height=size[1],
-        near=near,
-        far=far,
+        near=min(near, reach[0]),
+        far=max(far, reach[1]),
+        depth_range=None if reach == (near, far) else reach,
         noise_stddev=noise,
         noise_mean=mean,
         optical_frame=text_of(sensor, "camera/optical_frame_id", *FRAME_TAGS),
@@ -166,18 +176,48 @@ def _read(sensor: Element, camera: Element, link: str, report: Report) -> Camera
         depth_encoding="16UC1" if coarse.upper() in ("16UC1", "L16", "L_INT16", "R_UINT16") else "32FC1",
         depth_noise=_depth_noise(sensor, camera, report),
         distortion=tuple(_number_at(camera, f"distortion/{name}", 0.0) for name in DISTORTION),  # type: ignore[arg-type]
+        intrinsics=None if kind_of(sensor) == _WIDE else _intrinsics(sensor, camera, size, report),
+        baseline=_baseline(sensor, camera),
         exposure=_exposure(sensor, camera, report),
         wide=read_wide_lens(sensor, camera, size, fov, report) if kind_of(sensor) == _WIDE else None,
     )
 
 
-def _size(sensor: Element, width: float, height: float, report: Report) -> tuple[float, float]:
-    for size in (width, height):
-        if size != int(size) or not 1 <= size <= MAX_PIXELS:
-            valid = f"whole numbers from 1 to {MAX_PIXELS}"
-            add_fault(report, sensor, f" has an image of {width:g} x {height:g} pixels; valid are {valid}")
-            return 1.0, 1.0
-    return width, height
+def _reach(sensor: Element, camera: Element, near: float, far: float) -> tuple[float, float]:
+    """Return between which depths are told [m]; colours are not cut off there."""
+    low = number_in(first(camera, "depth_camera/clip/near"))
+    high = number_in(first(camera, "depth_camera/clip/far"))
+    if low is None:
+        low = number_in(sensor.find("plugin/min_depth"))
+    if high is None:
+        high = number_in(sensor.find("plugin/max_depth"))
+    return near if low is None else low, far if high is None else high
+
+
+def _intrinsics(
+    sensor: Element, camera: Element, size: tuple[int, int], report: Report
+) -> tuple[float, float, float, float] | None:
+    """Return fx, fy, cx and cy of `<lens><intrinsics>`; None if the field of view tells them."""
+    said = camera.find("lens/intrinsics")
+    if said is None:
+        return None
+    fx, fy, skew = (_number_at(said, name, 0.0) for name in ("fx", "fy", "s"))
+    if skew or min(fx, fy) <= 0.0:
+        add_fault(report, sensor, " has <intrinsics> with fx and fy not both positive, or s not 0")
+        return None
+    return fx, fy, _number_at(said, "cx", (size[0] - 1) / 2.0), _number_at(said, "cy", (size[1] - 1) / 2.0)
+
+
+def _baseline(sensor: Element, camera: Element) -> float:
+    """Return how far a camera is to the right of the left one of a stereo pair [m].
+
+    The plugin of ROS 1 tells it of the right lens of a multicamera only, which is what CameraInfo means;
+    that of ROS 2 of all of them.
+    """
+    given = number_in(first(sensor, "plugin/hack_baseline", "plugin/hackBaseline"))
+    all_ = sensor.findall("camera")
+    left = next((lens for lens in all_ if "left" in lens.get("name", "")), all_[0])
+    return 0.0 if given is None or (len(all_) > 1 and camera is left) else given
 
 
 def _truth(sensor: Element, camera: Element, report: Report) -> _Truth:
@@ -228,21 +268,27 @@ def _exposure(sensor: Element, camera: Element, report: Report) -> Exposure | No
     return Exposure(**values)
 
 
-def _topics(sensor: Element, name: str) -> CameraTopics:
+def _topics(sensor: Element, camera: Element, name: str) -> CameraTopics:
     """Return the topics, below the camera's name unless the file says otherwise.
 
     `<topic>` of new Gazebo is that of the images, or for a camera of colours and depth what all are below.
+    Each lens of a multicamera has topics of its own, below its name, as Gazebo's plugins have it.
     """
-    base = _relative(text_of(sensor, "plugin/camera_name", "plugin/cameraName")) or name
+    lens, plugin = _lens_name(sensor, camera), sensor.find("plugin")
+    own = _relative(text_of(sensor, "plugin/camera_name", "plugin/cameraName"))
+    if lens and (own or plugin is not None):
+        own = f"{own or sensor.get('name', '')}/{lens}"
+    own = own or name
     space = _relative(text_of(sensor, "plugin/ros/namespace"))
-    if space:
-        base = f"{space}/{base}"
+    base = f"{space}/{own}" if space else own
     given = _relative(text_of(sensor, "topic"))
     sees = _SEES[kind_of(sensor)]
     if given and not sees:
         topics = replace(CameraTopics.below(given), **CameraTopics.of_truth(given))
         if kind_of(sensor).startswith("boundingbox"):
             topics = replace(topics, boxes=given)
+    elif given and lens:
+        topics = CameraTopics.below(f"{given}/{lens}")
     elif given and sees == _COLOUR | _DEPTH:
         topics = CameraTopics.below(given)
     elif given:
@@ -253,7 +299,10 @@ def _topics(sensor: Element, name: str) -> CameraTopics:
             topics = replace(topics, depth=given, depth_info=info, points=f"{given}/points")
     else:
         topics = CameraTopics.below(base)
-    return replace(topics, **_renamed(sensor, base))
+    info = _relative(text_of(camera, "camera_info_topic"))
+    if info:
+        topics = replace(topics, **{"info" if sees != _DEPTH else "depth_info": info})
+    return replace(topics, **_renamed(sensor, base, own, of_several=bool(lens)))
 
 
 _PARTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -276,17 +325,27 @@ _REMAPPED = {
 """What ROS 2's plugin calls its topics before they are remapped."""
 
 
-def _renamed(sensor: Element, base: str) -> dict[str, str]:
-    """Return the topics that a plugin names, by the field of `CameraTopics`."""
+def _renamed(sensor: Element, base: str, own: str, *, of_several: bool) -> dict[str, str]:
+    """Return the topics that a plugin names, by the field of `CameraTopics`.
+
+    Args:
+        sensor: Of the plugin.
+        base: What its topics are below.
+        own: The end of that, without a namespace.
+        of_several: Whether it is a lens of a multicamera: a name without the lens's is of all, so of none.
+    """
     named = {}
     for part, tags in _PARTS.items():
         text = text_of(sensor, *(f"plugin/{tag}" for tag in tags))
         if text:
-            below = sensor.find("plugin/cameraName") is not None and not text.startswith("/")
+            named_base = of_several or sensor.find("plugin/cameraName") is not None
+            below = named_base and not text.startswith("/")
             named[part] = f"{base}/{_relative(text)}" if below else _relative(text)
     for rule in sensor.iterfind("plugin/ros/remapping"):
         before, _, after = (rule.text or "").strip().partition(":=")
-        plain = _relative(before).removeprefix(f"{base.rpartition('/')[2]}/")
+        plain = _relative(before).removeprefix(f"{own}/")
+        if of_several and plain == _relative(before):
+            continue
         if plain in _REMAPPED and _relative(after):
             named[_REMAPPED[plain]] = _relative(after)
     return named

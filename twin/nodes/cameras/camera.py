@@ -155,7 +155,7 @@ class CameraPublisher:
         seen = self._seen(lambda: look(time_ns, colours=colours, depth=depth)) if colours or depth else None
         said: dict[str, Any] = {}
         for what in sorted(wanted & {"info", "depth_info"}):
-            said[what] = messages.camera_info(header, self._lens)
+            said[what] = messages.camera_info(header, self._lens, spec.baseline)
         if seen is not None and seen.colours is not None:
             if "image" in wanted:
                 said["image"] = messages.image(header, seen.colours, spec.encoding)

@@ -132,14 +132,21 @@ def rgb(pixels: NDArray[np.uint8], encoding: str) -> NDArray[np.uint8]:
     return pixels[..., ::-1] if encoding == "bgr8" else pixels
 
 
-def camera_info(header: Header, lens: Lens | WideLens) -> CameraInfo:
-    """Return how a camera projects (REP-104)."""
+def camera_info(header: Header, lens: Lens | WideLens, baseline: float = 0.0) -> CameraInfo:
+    """Return how a camera projects (REP-104).
+
+    Args:
+        header: Of the image.
+        lens: Through which it was taken.
+        baseline: How far it is to the right of the left camera of a stereo pair [m].
+    """
     info = new(CameraInfo)
     info.header, info.height, info.width = header, lens.height, lens.width
     info.distortion_model, distortion = lens.model
     info.d = np.array(distortion)
     info.k, info.r = lens.matrix.ravel(), np.eye(3).ravel()
     info.p = np.hstack((lens.matrix, np.zeros((3, 1)))).ravel()
+    info.p[3] = -info.p[0] * baseline
     return info
 
 

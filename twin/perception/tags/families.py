@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.perception.opencv import opencv
+from twin.perception.tags import tag36h11
 
 FamilyName = Literal[
     "tag16h5", "tag25h9", "tag36h10", "tag36h11",
@@ -64,9 +65,14 @@ def modules(family: str, number: int) -> NDArray[np.bool_]:
     """Return which modules of a tag are white, rows from the top, without its black border.
 
     Raises:
-        ScenarioError: OpenCV is not installed.
+        ScenarioError: OpenCV is not installed, and it is none of `tag36h11`.
     """
-    known, codes = FAMILIES[family], dictionary(family)
+    known = FAMILIES[family]
+    if family == "tag36h11":
+        code = int(tag36h11.CODES[tag36h11.DIGITS * number :][: tag36h11.DIGITS], 16)
+        places = np.arange(known.side**2 - 1, -1, -1)
+        return ((code >> places) & 1).astype(bool).reshape(known.side, known.side)
+    codes = dictionary(family)
     bits = codes.getBitsFromByteList(codes.bytesList[number : number + 1], known.side)
     return np.rot90(bits, 2 * known.half_turns).astype(bool)
 
@@ -80,7 +86,7 @@ def picture(family: str, number: int, pixels: int) -> NDArray[np.uint8]:
         pixels: For each module.
 
     Raises:
-        ScenarioError: OpenCV is not installed.
+        ScenarioError: OpenCV is not installed, and it is none of `tag36h11`.
     """
     grey = np.pad(np.pad(modules(family, number), 1), 1, constant_values=True).astype(np.uint8) * 255
     return grey.repeat(pixels, axis=0).repeat(pixels, axis=1)

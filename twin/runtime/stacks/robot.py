@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -184,7 +186,11 @@ class RobotStack:
 
 def _cameras(context: StackContext) -> list[CameraPublisher]:
     cameras, need = context.handle.cameras, context.config.cameras
-    if not cameras or need == "off":
+    if need == "off":
+        return []
+    for warning in context.handle.description.left_out:
+        _tell(str(warning))
+    if not cameras:
         return []
     from twin.nodes.cameras.camera import CameraPublisher
     from twin.nodes.cameras.truth import TruthPublisher
@@ -195,3 +201,9 @@ def _cameras(context: StackContext) -> list[CameraPublisher]:
         kind(context.bus, camera, description, namespace=namespace, need=need)
         for kind, camera in zip(kinds, cameras, strict=True)
     ]
+
+
+@cache
+def _tell(warning: str) -> None:
+    """Tell once in a process, not to /rosout: what is left out of a file is no part of what the run is."""
+    logging.getLogger("twin.camera").warning(warning)

@@ -79,6 +79,9 @@ class Camera:
                 seen = np.clip(np.rint(grey), 0.0, 255.0).astype(np.uint8)
         if depth:
             distance = self.source.nearest(z)
+            if spec.depth_range is not None:
+                nearest, farthest = spec.depth_range
+                distance[(distance < nearest) | (distance > farthest)] = np.nan
             if spec.depth_noise is not None:
                 grain = self._depth_noise.normal(tick, distance.size).reshape(distance.shape)
                 distance = noisy(distance, spec.depth_noise, spec.lens.focal_length, grain)

@@ -70,7 +70,7 @@ class Eyes:
             source, body = camera.source, spec.body(camera.mount.body)
             for side, turn in enumerate(source.turns):
                 pose, name = camera.spec.T_link_sensor @ turn, f"camera {number}.{side}"
-                add_camera(body, name, pose, source.size, source.focal_length)
+                add_camera(body, name, pose, source.size, source.focal_lengths, source.centre)
         self._world, self.model = world, spec.compile()
         self._data = mujoco.MjData(self.model)
         self._canvas = Canvas(self.model, *map(int, sizes.max(axis=0)))

@@ -30,14 +30,16 @@ class Source:
     """What is drawn for a camera, of which its lens makes its image.
 
     For a pinhole that is the image itself. For a distorted one it is an image as large as what the lens
-    sees, with the same focal length; for a wide-angle camera, as many faces of a cube as its lens sees.
+    sees, with the same focal lengths; for a wide-angle camera, as many faces of a cube as its lens sees.
     """
 
     def __init__(self, lens: Lens | WideLens) -> None:
         self.size = lens.width, lens.height
         """Width and height of what is drawn, of each view [pixels]."""
-        self.focal_length = lens.focal_length
-        """Of each view [pixels]."""
+        self.focal_lengths = lens.focal_lengths
+        """Of each view, along u and v [pixels]."""
+        self.centre = lens.centre
+        """Where the axis of each view meets it [pixels]."""
         self.turns: tuple[Pose3, ...] = (_AHEAD,)
         """Where the views look, from the camera's frame, which looks along +x."""
         self.lit = 1.0
@@ -46,6 +48,7 @@ class Source:
         if self._is_same:
             return
         view, at = self._on_cube(lens) if isinstance(lens, WideLens) else self._on_plane(lens)
+        self.centre = (self.size[0] - 1) / 2.0, (self.size[1] - 1) / 2.0
         self._unseen = ~((at >= 0.0) & (at <= np.array(self.size) - 1)).all(axis=-1)
         self.lit = max(1.0 - float(self._unseen.mean()), 1.0 / self._unseen.size)
         at[self._unseen] = 0.0
@@ -82,8 +85,8 @@ class Source:
 
     def _on_plane(self, lens: Lens) -> tuple[NDArray[np.intp], Array]:
         """Settle the size of the one view; return where in it the pixels are."""
-        seen = lens.rays() * lens.focal_length
-        most = _WIDEST * np.array(self.size) / 2.0
+        seen = lens.rays() * lens.focal_lengths
+        most = _WIDEST * np.array(self.size) / 2.0 + np.abs(np.subtract(lens.centre, lens.middle))
         reach = np.minimum(np.nanmax(np.abs(seen), axis=(0, 1)), most)
         self.size = 2 * math.ceil(reach[0] + 1.0), 2 * math.ceil(reach[1] + 1.0)
         return np.zeros(seen.shape[:2], np.intp), seen + (np.array(self.size) - 1) / 2.0
@@ -94,7 +97,7 @@ class Source:
         The middles of the outermost pixels of a face are on the edges of the cube.
         """
         self.size = lens.texture_size, lens.texture_size
-        self.focal_length = (lens.texture_size - 1) / 2.0
+        self.focal_lengths = ((lens.texture_size - 1) / 2.0,) * 2
         seen = lens.directions()
         face, at = np.zeros(seen.shape[:2], np.intp), np.full((*seen.shape[:2], 2), np.nan)
         turns: list[Pose3] = []
@@ -105,7 +108,7 @@ class Source:
             if mine.any():
                 face[mine] = len(turns)
                 beside = np.clip(np.stack((x, y), axis=-1)[mine] / z[mine][:, None], -1.0, 1.0)
-                at[mine] = (beside + 1.0) * self.focal_length
+                at[mine] = (beside + 1.0) * self.focal_lengths[0]
                 turns.append(turn)
         self.turns = tuple(turns) or (_AHEAD,)
         return face, at
