@@ -1,6 +1,6 @@
 /** The operator's page: what stands where. */
 
-import { html, render, useEffect, useReducer, useRef, useState } from "ui";
+import { html, render, useEffect, useLayoutEffect, useReducer, useRef, useState } from "ui";
 import { ZoneBar, Zones, ZonesPanel } from "./zones.js";
 import { Camera } from "./camera.js";
 import { Drive } from "./drive.js";
@@ -118,7 +118,7 @@ function panelsOf(station) {
   return station.history ? { mission: Mission, ...rest } : PANELS;
 }
 
-function Panels({ station, t, panel: chosen, setPanel }) {
+function Panels({ station, t, theme, panel: chosen, setPanel }) {
   const panels = panelsOf(station), panel = panels[chosen] ? chosen : Object.keys(panels)[0];
   const Panel = panels[panel], open = [...station.alarms.values()].filter((alarm) => !alarm.acknowledged).length;
   const names = Object.keys(panels);
@@ -131,7 +131,7 @@ function Panels({ station, t, panel: chosen, setPanel }) {
   };
   return html`<section class="card panels">
     <div role="tablist" aria-label=${t("panels")} onKeyDown=${turn}>${names.map((name) => html`<button role="tab" id="tab-${name}" aria-selected=${panel === name} aria-controls="panel" tabindex=${panel === name ? 0 : -1} onClick=${() => setPanel(name)}>${t(name)}${name === "alarms" && open > 0 && html` <span class="count">${open}</span>`}</button>`)}</div>
-    <div role="tabpanel" id="panel" aria-labelledby="tab-${panel}" tabindex="0"><${Panel} key=${panel} station=${station} t=${t} /></div></section>`;
+    <div role="tabpanel" id="panel" aria-labelledby="tab-${panel}" tabindex="0"><${Panel} key=${panel} station=${station} t=${t} theme=${theme} /></div></section>`;
 }
 
 function Stage({ station, t }) {
@@ -169,9 +169,9 @@ function App({ station }) {
   useEffect(() => { station.addEventListener("change", refresh); return () => station.removeEventListener("change", refresh); }, []);
   useEffect(() => { station.addEventListener("proposal", () => setPanel("tasks")); }, []);
   useEffect(() => { document.documentElement.lang = language; keep("language", language); }, [language]);
-  useEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
-  const t = wordsOf(language), props = { station, t };
-  return html`<${Header} ...${props} theme=${theme} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
+  useLayoutEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
+  const t = wordsOf(language), props = { station, t, theme };
+  return html`<${Header} ...${props} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
     <${Banner} ...${props} />
     <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} />${!station.history && html`<${Simulation} ...${props} />`}<div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }

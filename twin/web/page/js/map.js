@@ -127,7 +127,7 @@ export class MapView {
     this._metres(c, w, h, colour);
     if (this.layers.scan && robot.scan) {
       c.fillStyle = colour("scan");
-      for (const point of robot.scan) {
+      for (const point of robot.scan.placed) {
         const [x, y] = this.pixel(point);
         c.fillRect(x - 1.25, y - 1.25, 2.5, 2.5);
       }
@@ -138,8 +138,8 @@ export class MapView {
       this._line(c, robot.plan.poses.map(({ pose }) => [pose.position.x, pose.position.y]));
     }
     if (this.layers.zones) station.zones.draw(this, c, colour);
-    this._things(c, robot, robot.goods, 0.15, colour("goods"));
-    this._things(c, robot, robot.people, 0.25, colour("people"));
+    this._things(c, robot.goods, 0.15, colour("goods"));
+    this._things(c, robot.people, 0.25, colour("people"));
     drawTasks(c, this, robot, colour);
     station.queue.filter((goal) => goal.state === "active" || goal.state === "waiting").forEach((goal, i) => this._flag(c, [goal.x, goal.y], goal.yaw, colour("accent"), goal.state === "active" ? "" : String(i + 1)));
     for (const each of station.robots.values()) this._robot(c, each, each === robot, colour);
@@ -179,15 +179,12 @@ export class MapView {
     c.stroke();
   }
 
-  _things(c, robot, message, half, colour) {
-    if (!message) return;
+  _things(c, seen, half, colour) {
+    if (!seen) return;
     c.strokeStyle = colour;
     c.lineWidth = 2;
-    const { pose } = robot.frames.lookup(message.header.frame_id);
-    for (const each of message.poses) {
-      const at = compose(pose, poseOf(each));
+    for (const at of seen.placed)
       this._line(c, [[-half, -half], [half, -half], [half, half], [-half, half]].map((corner) => place(at, [...corner, 0])), true);
-    }
   }
 
   _flag(c, at, yaw, colour, text) {

@@ -48,7 +48,9 @@ export class Rosbridge extends EventTarget {
   _receive(message) {
     this.heard = performance.now();
     if (message.op === "publish") {
-      this._topics.get(message.topic)?.callbacks.forEach((callback) => callback(message.msg));
+      const topic = this._topics.get(message.topic);
+      if (topic) topic.last = message.msg;
+      topic?.callbacks.forEach((callback) => callback(message.msg));
       return;
     }
     if (message.op === "status") {
@@ -66,7 +68,15 @@ export class Rosbridge extends EventTarget {
     else waiting.resolve(message.op === "service_response" ? message.values : message);
   }
 
-  /** Hear a topic; returns a function that ends it. `throttle` is the least time between messages [ms]. */
+  /** Forget what topics said last: it is not true any more. */
+  forget() {
+    this._topics.forEach((topic) => delete topic.last);
+  }
+
+  /**
+   * Hear a topic; returns a function that ends it. `throttle` is the least time between messages [ms].
+   * Who is not the first to hear it is given the last message: the server sends that to the first only.
+   */
   subscribe(topic, type, callback, throttle = 0) {
     let known = this._topics.get(topic);
     if (!known) {
@@ -76,6 +86,7 @@ export class Rosbridge extends EventTarget {
       this._send(request);
     }
     known.callbacks.add(callback);
+    if (known.last !== undefined) queueMicrotask(() => known.last !== undefined && known.callbacks.has(callback) && callback(known.last));
     return () => {
       known.callbacks.delete(callback);
       if (known.callbacks.size || this._topics.get(topic) !== known) return;

@@ -1,7 +1,7 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
 import { addPlace } from "./tasks.js";
-import { Frames, place, poseOf, quaternionOf } from "./transforms.js";
+import { Frames, compose, place, poseOf, quaternionOf } from "./transforms.js";
 import { TiledGrid, WholeGrid } from "./grids.js";
 import { HISTORY, takeHistory } from "./history.js";
 
@@ -73,6 +73,7 @@ export class Station extends EventTarget {
   }
 
   forget() {
+    this.ros.forget();
     this.robots.forEach((robot) => robot.forget());
     this.log = [];
     this.alarms.clear();
@@ -179,7 +180,7 @@ export class Station extends EventTarget {
         robot.velocity = { linear: msg.twist.twist.linear.x, angular: msg.twist.twist.angular.z };
       }, 100);
     } else if (type === "tf2_msgs/msg/TFMessage" && (last === "tf" || last === "tf_static"))
-      hear((msg) => this._robotsIn(space).forEach((robot) => robot.frames.take(msg)), 0);
+      hear((msg) => this._robotsIn(space).forEach((robot) => robot.frames.take(msg, last === "tf_static")), 0);
     else if (type === GRID) {
       const kind = topic.endsWith("global_costmap/costmap") ? "global" : topic.endsWith("local_costmap/costmap") ? "local" : last === "map" ? "map" : /mask|^vo_map$/.test(last) ? "zones" : "";
       if (kind) this._grid(topic, kind);
@@ -197,8 +198,8 @@ export class Station extends EventTarget {
       owned((robot, msg) => {
         if (robot.mission.at(-1)?.state !== msg.data) robot.mission.push({ state: msg.data, time: this.clock.time });
       });
-    else if (type === "geometry_msgs/msg/PoseArray" && last === "tote_poses") owned((robot, msg) => (robot.goods = msg), 500);
-    else if (type === "geometry_msgs/msg/PoseArray" && last === "people") owned((robot, msg) => (robot.people = msg), 200);
+    else if (type === "geometry_msgs/msg/PoseArray" && last === "tote_poses") owned((robot, msg) => (robot.goods = new Seen(robot, msg.header, msg.poses.map(poseOf), compose)), 500);
+    else if (type === "geometry_msgs/msg/PoseArray" && last === "people") owned((robot, msg) => (robot.people = new Seen(robot, msg.header, msg.poses.map(poseOf), compose)), 200);
     else if (type === "geometry_msgs/msg/PoseWithCovarianceStamped" && last === "amcl_pose")
       owned((robot, msg) => (robot.spread = Math.sqrt(Math.max(0, msg.pose.covariance[0] + msg.pose.covariance[7]))), 200);
     else if (type === "diagnostic_msgs/msg/DiagnosticArray" && topic.endsWith("guard/status"))
@@ -416,13 +417,31 @@ export class Station extends EventTarget {
   }
 }
 
+/** Things that were seen from the robot: they stay where they were then, wherever it drives. */
+class Seen {
+  /** @param into what puts a thing of the header's frame into the frame of a pose: `compose` or `place` */
+  constructor(robot, { frame_id: frame, stamp }, things, into) {
+    Object.assign(this, { robot, frame, stamp, things, into });
+  }
+
+  /** Where they are, none as long as that is not known: the transforms of that time may come after them. */
+  get placed() {
+    if (this._placed) return this._placed;
+    const { frames, base } = this.robot, found = frames.at(this.frame, this.stamp);
+    if (!found) return [];
+    const placed = this.things.map((thing) => this.into(found.pose, thing));
+    const { root } = frames.lookup(base);
+    if (found.root === root && root !== base) this._placed = placed;
+    return root === base && found.root !== base ? [] : placed;
+  }
+}
+
 function takeScan(robot, scan) {
-  const { pose } = robot.frames.lookup(scan.header.frame_id);
   const points = [];
   scan.ranges.forEach((range, i) => {
     if (range === null || range < scan.range_min || range > scan.range_max) return;
     const angle = scan.angle_min + i * scan.angle_increment;
-    points.push(place(pose, [range * Math.cos(angle), range * Math.sin(angle), 0]));
+    points.push([range * Math.cos(angle), range * Math.sin(angle), 0]);
   });
-  robot.scan = points;
+  robot.scan = new Seen(robot, scan.header, points, place);
 }
