@@ -84,6 +84,12 @@ def test_the_page_shows_a_bag_as_it_was_and_commands_nothing(address: str) -> No
         assert "a wheel slips" in page.inner_text("ol.log")
         page.click("#tab-alarms")
         assert page.locator("li.alarm").count() == 1
+        assert page.inner_text("li.alarm time") == "0:50", "when it was said, not when it was heard"
+        page.click("li.alarm button")
+        page.reload()
+        page.wait_for_selector("text=History")
+        page.click("#tab-alarms")
+        page.wait_for_selector("li.alarm.known")
         assert not page.evaluate(GOODS), "where the robot was when it saw them is not known"
 
         slide(page, 20.0)  # back

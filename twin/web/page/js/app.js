@@ -1,6 +1,7 @@
 /** The operator's page: what stands where. */
 
 import { html, render, useEffect, useLayoutEffect, useReducer, useRef, useState } from "ui";
+import { said } from "./alarms.js";
 import { ZoneBar, Zones, ZonesPanel } from "./zones.js";
 import { Camera } from "./camera.js";
 import { Drive } from "./drive.js";
@@ -22,7 +23,7 @@ function EmergencyStop({ station, t }) {
   const stopped = station.stopped, robots = [...station.robots.values()];
   const asked = robots.some((robot) => robot.stopAsked);
   if (!stopped.length)
-    return html`<button id="stop" class="stop" onClick=${() => station.stop()} disabled=${!robots.some((robot) => robot.guard)}
+    return html`<button id="stop" class="stop ${station.ros.connected ? "" : "unheard"}" onClick=${() => station.stop()} disabled=${!robots.some((robot) => robot.guard)}
       title=${robots.some((robot) => robot.guard) ? t("stop") : t("noStop")}>${asked ? t("stopping") : t("stopShort")}</button>`;
   return html`
     <button id="release" class="stop latched" onClick=${() => dialog.current.showModal()} aria-label=${t("release")}>${t("release")}</button>
@@ -47,31 +48,53 @@ function Control({ station, t }) {
     <button onClick=${() => station.take(command)}>${t(mine ? "giveBack" : control.holder ? "takeOver" : "take")}</button></div>`;
 }
 
-function Header({ station, t, theme, setTheme, language, setLanguage }) {
-  const age = (performance.now() - station.ros.heard) / 1000, up = station.ros.connected, paused = stands(station), silent = up && !paused && age > SILENT_S;
+/** Whether the page is as narrow as on a telephone held upright: then the header has room for little more than STOP. */
+function useNarrow() {
+  const query = useRef(matchMedia("(max-width: 900px) and (orientation: portrait), (max-width: 600px)")).current, [narrow, setNarrow] = useState(query.matches);
+  useEffect(() => {
+    const look = () => setNarrow(query.matches);
+    query.addEventListener("change", look);
+    return () => query.removeEventListener("change", look);
+  }, []);
+  return narrow;
+}
+
+function Figures({ station, t }) {
   const { time, factor } = station.clock;
+  return html`<dl class="figures"><div><dt>${t("time")}</dt><dd>${clock(time)}</dd></div>
+    <div><dt>${t("pace")}</dt><dd>${factor === null ? "–" : `${factor.toFixed(1)}×`}</dd></div></dl>`;
+}
+
+function Display({ t, theme, setTheme, language, setLanguage }) {
+  return html`<button class="plain" id="language" lang=${language === "en" ? "zh" : "en"} onClick=${() => setLanguage(language === "en" ? "zh" : "en")}>${t("language")}</button>
+    <button class="plain" id="theme" aria-label=${t("theme")} title=${t("theme")} onClick=${() => setTheme(theme === "dark" ? "light" : "dark")}>${theme === "dark" ? "☀" : "☾"}</button>`;
+}
+
+function Header({ narrow, ...props }) {
+  const { station, t } = props;
+  const age = (performance.now() - station.ros.heard) / 1000, up = station.ros.connected, paused = stands(station), silent = up && !paused && age > SILENT_S;
   return html`
     <header>
       <div class="brand"><img src="icon.svg" alt="" width="28" height="28" /><h1>${t("title")}</h1>
         ${station.robot?.label && html`<span class="badge">${station.robot.label}</span>`}</div>
       <div class="lamp ${up ? (silent || paused ? "warn" : "good") : "bad"}" role="status"><span class="dot"></span>
         <span class="lamp-words">${up ? (silent ? `${t("silent")} ${age.toFixed(0)} s` : t(paused ? "paused" : "connected")) : t("disconnected")}</span></div>
-      <dl class="figures wide"><div><dt>${t("time")}</dt><dd>${clock(time)}</dd></div>
-        <div><dt>${t("pace")}</dt><dd>${factor === null ? "–" : `${factor.toFixed(1)}×`}</dd></div></dl>
+      ${!narrow && html`<${Figures} ...${props} />`}
       ${station.robots.size > 1 && html`<select aria-label=${t("robot")} value=${station.selected} onChange=${(event) => station.select(event.target.value)}>
         ${[...station.robots.values()].map((robot) => html`<option value=${robot.space}>${robot.name}</option>`)}</select>`}
       <span class="grow"></span>
       <div class="wide"><${Control} station=${station} t=${t} /></div>
-      <button class="plain" id="language" lang=${language === "en" ? "zh" : "en"} onClick=${() => setLanguage(language === "en" ? "zh" : "en")}>${t("language")}</button>
-      <button class="plain" id="theme" aria-label=${t("theme")} title=${t("theme")} onClick=${() => setTheme(theme === "dark" ? "light" : "dark")}>${theme === "dark" ? "☀" : "☾"}</button>
+      ${!narrow && html`<${Display} ...${props} />`}
       ${!station.history && html`<${EmergencyStop} station=${station} t=${t} />`}
     </header>`;
 }
 
 function Banner({ station, t }) {
-  const stopped = station.stopped;
-  if (!stopped.length) return null;
-  return html`<div class="banner" role="alert">${stopped.map((robot) => html`<span>${t("stop")}: ${robot.name} – ${t("stopped")} ${robot.guard.stoppedBy} </span>`)}</div>`;
+  const lost = !station.history && station.alarms.get("connection")?.active, by = new Map();
+  for (const { name, guard } of station.stopped) by.set(guard.stoppedBy, [...(by.get(guard.stoppedBy) ?? []), name]);
+  if (!by.size && !lost) return null;
+  return html`<div class="banner" role="alert">${lost && html`<p id="lost">${t("unreached")}</p>`}
+    ${[...by].map(([who, names]) => html`<p>${t("stop")}: ${names.join(", ")} – ${t("stopped")} ${who}</p>`)}</div>`;
 }
 
 function RobotCard({ station, t }) {
@@ -94,13 +117,13 @@ function Alarms({ station, t }) {
   const alarms = [...station.alarms.values()].sort((a, b) => a.acknowledged - b.acknowledged || b.time - a.time);
   if (!alarms.length) return html`<p class="muted">${t("noAlarms")}</p>`;
   return html`<ul class="list" id="alarm-list">${alarms.map((alarm) => html`<li key=${alarm.key} class="alarm ${alarm.level} ${alarm.acknowledged ? "known" : ""}">
-    <div class="grow"><time>${clock(alarm.time)}</time> ${alarm.key === "connection" ? t("connection") : alarm.text} ${!alarm.active && html`<i>(${t("over")})</i>`}</div>
+    <div class="grow"><time>${clock(alarm.time)}</time> ${said(alarm.text, t)} ${!alarm.active && html`<i>(${t("over")})</i>`}</div>
     ${alarm.acknowledged ? html`<span class="muted">${t("acknowledged")}</span>` : html`<button onClick=${() => station.acknowledge(alarm.key)}>${t("acknowledge")}</button>`}</li>`)}</ul>`;
 }
 
 function Log({ station, t }) {
   if (!station.log.length) return html`<p class="muted">${t("noLog")}</p>`;
-  return html`<ol class="log">${station.log.map((line) => html`<li key=${line.key} class=${line.level}><time>${clock(line.time)}</time> <b>${line.source}</b> ${line.text}</li>`)}</ol>`;
+  return html`<ol class="log">${station.log.map((line) => html`<li key=${line.key} class=${line.level}><time>${clock(line.time)}</time> <b>${line.source}</b> ${said(line.text, t)}</li>`)}</ol>`;
 }
 
 /** A component of a module that is loaded when it is first shown: three and uPlot are large. */
@@ -135,7 +158,7 @@ function Panels({ station, t, theme, panel: chosen, setPanel }) {
 }
 
 function Stage({ station, t }) {
-  const [tool, setTool] = useState("pan"), [mode, setMode] = useState("map"), [follow, setFollow] = useState(false);
+  const [tool, setTool] = useState("pan"), [mode, setMode] = useState("map"), [follow, setFollow] = useState(false), [open, setOpen] = useState(false);
   const [layers, setLayers] = useState({ costmap: true, scan: true, plan: true, zones: true });
   const view = useRef();
   const set = (x, y, yaw) => {
@@ -157,7 +180,8 @@ function Stage({ station, t }) {
     ${mode === "map" && html`<div class="bar bottom" role="toolbar" aria-label=${t("layers")}>
       <button class="icon" aria-label=${t("zoomOut")} onClick=${() => view.current.zoom(0.8)}>−</button><button class="icon" aria-label=${t("zoomIn")} onClick=${() => view.current.zoom(1.25)}>+</button>
       <button onClick=${() => { setFollow(false); view.current.fit(); }}>${t("fit")}</button>${toggle("follow", follow, () => setFollow(!follow))}
-      <span class="wide layers">${Object.keys(layers).map((name) => toggle(name, layers[name], () => setLayers({ ...layers, [name]: !layers[name] })))}</span></div>`}
+      <button id="layers" class="narrow" aria-expanded=${open} onClick=${() => setOpen(!open)}>${t("layers")}</button>
+      <span class="layers ${open ? "" : "wide"}">${Object.keys(layers).map((name) => toggle(name, layers[name], () => setLayers({ ...layers, [name]: !layers[name] })))}</span></div>`}
   </section>`;
 }
 
@@ -170,10 +194,11 @@ function App({ station }) {
   useEffect(() => { station.addEventListener("proposal", () => setPanel("tasks")); }, []);
   useEffect(() => { document.documentElement.lang = language; keep("language", language); }, [language]);
   useLayoutEffect(() => { document.documentElement.dataset.theme = theme; keep("theme", theme); }, [theme]);
-  const t = wordsOf(language), props = { station, t, theme };
-  return html`<${Header} ...${props} setTheme=${setTheme} language=${language} setLanguage=${setLanguage} /><${HistoryBar} ...${props} />
-    <${Banner} ...${props} />
-    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}><${RobotCard} ...${props} />${!station.history && html`<${Simulation} ...${props} />`}<div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
+  const t = wordsOf(language), props = { station, t, theme }, display = { ...props, setTheme, language, setLanguage }, narrow = useNarrow();
+  return html`<div class="head"><${Header} ...${display} narrow=${narrow} /><${Banner} ...${props} /></div><${HistoryBar} ...${props} />
+    <main><${Stage} ...${props} /><aside aria-label=${t("panels")}>
+      ${narrow && html`<section class="row display" aria-label=${t("display")}><${Figures} ...${props} /><span class="grow"></span><${Display} ...${display} /></section>`}
+      <${RobotCard} ...${props} />${!station.history && html`<${Simulation} ...${props} />`}<div class="narrow"><${Control} ...${props} /></div><${Panels} ...${props} panel=${panel} setPanel=${setPanel} /></aside></main>`;
 }
 
 const token = new URLSearchParams(location.search).get("token");

@@ -5,6 +5,7 @@ import { drawTasks } from "./tasks.js";
 import { compose, place, poseOf, yawOf } from "./transforms.js";
 
 const DRAG_PX = 8;
+const LOW_PX = 420;
 const KINDS = ["map", "zones", "global", "local"]; // from below
 
 export class MapView {
@@ -32,9 +33,16 @@ export class MapView {
     const { clientWidth: w, clientHeight: h } = this.canvas;
     if (!grid) return false;
     const { width, height, resolution, origin } = grid.info;
-    this.scale = Math.min(w / (width * resolution), h / (height * resolution)) * 0.94;
-    this.centre = [origin.position.x + width * resolution / 2, origin.position.y + height * resolution / 2];
+    const [top, bottom] = h < LOW_PX ? this._bars(h) : [0, h]; // there is little to see: none of it under buttons
+    this.scale = Math.min(w / (width * resolution), (bottom - top) / (height * resolution)) * 0.94;
+    this.centre = [origin.position.x + width * resolution / 2, origin.position.y + height * resolution / 2 + ((top + bottom - h) / 2) / this.scale];
     return true;
+  }
+
+  /** Between which heights no buttons lie over the map [px]. */
+  _bars(h) {
+    const [top, bottom] = ["top", "bottom"].map((side) => this.canvas.parentElement.querySelector(`.bar.${side}`));
+    return [top ? top.offsetTop + top.offsetHeight : 0, bottom ? bottom.offsetTop : h];
   }
 
   zoom(by) {
@@ -158,7 +166,8 @@ export class MapView {
   /** A ruler in the corner. */
   _metres(c, w, h, colour) {
     const length = [0.5, 1, 2, 5, 10, 20, 50].find((metres) => metres * this.scale > 60) ?? 100;
-    const left = w - 16 - length * this.scale;
+    const left = w - 16 - length * this.scale, bar = this.canvas.parentElement.querySelector(".bar.bottom");
+    if (bar && bar.offsetLeft + bar.offsetWidth > left - 12) h = bar.offsetTop; // above the buttons, not under them
     c.strokeStyle = c.fillStyle = colour("muted");
     c.lineWidth = 2;
     c.beginPath();

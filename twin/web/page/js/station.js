@@ -1,5 +1,6 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
+import { Alarms } from "./alarms.js";
 import { addPlace } from "./tasks.js";
 import { Frames, compose, place, poseOf, quaternionOf } from "./transforms.js";
 import { TiledGrid, WholeGrid } from "./grids.js";
@@ -14,6 +15,8 @@ const GOAL = { name: "navigate_to_pose", type: "nav2_msgs/action/NavigateToPose"
 const SUCCEEDED = 4, CANCELED = 5;
 const STOP_AGAIN_MS = 200;
 const STOP_UNHEARD_MS = 10_000;
+
+const seconds = ({ sec, nanosec }) => sec + nanosec * 1e-9;
 
 /** A robot: everything below one namespace. */
 class Robot {
@@ -49,7 +52,7 @@ export class Station extends EventTarget {
     this.selected = "";
     this.types = new Map(); // topic -> type
     this.log = [];
-    this.alarms = new Map(); // key -> {level, text, time, active, acknowledged}
+    this.alarms = new Alarms();
     this.clock = { time: null, factor: null };
     this.control = null; // twin_msgs/Control, and own id
     this.queue = []; // {id, x, y, yaw, state: waiting | active | succeeded | canceled | failed, left}
@@ -100,29 +103,19 @@ export class Station extends EventTarget {
   }
 
   /** Raise or end an alarm. */
-  alarm(key, level, text, active = true) {
-    const known = this.alarms.get(key);
-    if (!active && !known?.active) return;
-    const again = active && !(known?.active && known.text === text && known.level === level);
-    this.alarms.set(key, {
-      key, level, text: active ? text : known.text, active,
-      time: again ? this.clock.time : known.time,
-      acknowledged: again ? false : known.acknowledged,
-    });
-    this.changed();
+  alarm(key, level, text, { time = this.clock.time ?? Date.now() / 1000, ...more } = {}) {
+    if (this.alarms.raise(key, level, text, { time, ...more })) this.changed();
   }
 
   acknowledge(key) {
-    const alarm = this.alarms.get(key);
-    if (alarm?.active) alarm.acknowledged = true;
-    else this.alarms.delete(key);
+    this.alarms.acknowledge(key);
     this.changed();
   }
 
   _connection() {
     if (this.ros.connected) this._look();
     else this.queue.forEach((goal) => goal.state === "active" && (goal.state = "failed"));
-    this.alarm("connection", "error", "connection", !this.ros.connected);
+    this.alarm("connection", "error", (t) => t("connection"), { active: !this.ros.connected });
     this.changed();
   }
 
@@ -204,12 +197,13 @@ export class Station extends EventTarget {
       owned((robot, msg) => (robot.spread = Math.sqrt(Math.max(0, msg.pose.covariance[0] + msg.pose.covariance[7]))), 200);
     else if (type === "diagnostic_msgs/msg/DiagnosticArray" && topic.endsWith("guard/status"))
       owned((robot, msg) => this._guard(robot, msg));
-    else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, s.level > 0)));
+    else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, { active: s.level > 0, time: seconds(msg.header.stamp) })));
     else if (topic === "/rosout")
       hear((msg) => {
         const level = LEVELS[msg.level] ?? "info";
-        this.note(level, msg.name, msg.msg, msg.stamp.sec + msg.stamp.nanosec * 1e-9);
-        if (msg.level >= 40) this.alarm(`log ${msg.name}`, "error", `${msg.name}: ${msg.msg}`);
+        const time = seconds(msg.stamp);
+        this.note(level, msg.name, msg.msg, time);
+        if (msg.level >= 40) this.alarm(`log ${msg.name}`, "error", `${msg.name}: ${msg.msg}`, { time, isEvent: true });
       });
     else if (topic === "/clock") hear((msg) => this._time(msg.clock), 500);
     else if (type === "twin_msgs/msg/TaskQueue") owned((robot, msg) => (robot.tasks = msg));
@@ -248,7 +242,7 @@ export class Station extends EventTarget {
 
   _time({ sec, nanosec }) {
     if (this.history) return; // which has a time of its own
-    const time = sec + nanosec * 1e-9, now = performance.now() / 1000;
+    const time = seconds({ sec, nanosec }), now = performance.now() / 1000;
     const { time: before, at } = this.clock;
     const factor = before !== null && now > at ? (time - before) / (now - at) : null;
     this.clock = { time, at: now, factor: this.clock.factor === null ? factor : 0.7 * this.clock.factor + 0.3 * factor };
@@ -259,7 +253,7 @@ export class Station extends EventTarget {
     if (this.simulation && this.simulation.resets !== message.resets) {
       this.robots.forEach((robot) => Object.assign(robot, { mission: [], plan: undefined }));
       this.clock = { time: null, factor: null };
-      this.note("info", "simulation", "reset");
+      this.note("info", "simulation", (t) => t("begunAnew"));
     }
     this.simulation = message;
   }
@@ -270,7 +264,7 @@ export class Station extends EventTarget {
     const by = status.values.find(({ key }) => key === "stopped_by")?.value ?? "";
     robot.guard = { stoppedBy: by, stamp: message.header.stamp };
     if (by) robot.stopAsked = 0;
-    this.alarm(`guard ${robot.space}`, "error", `${robot.name}: emergency stop (${by})`, Boolean(by));
+    this.alarm(`guard ${robot.space}`, "error", (t) => `${robot.name}: ${t("stop")} (${by})`, { active: Boolean(by), time: seconds(robot.guard.stamp) });
   }
 
   /** Press the emergency stop of all robots; said again until each tells that it is stopped, not for ever to one without a guard. */
@@ -332,7 +326,7 @@ export class Station extends EventTarget {
       header: { frame_id: robot.pose.root },
       pose: { pose: { position: { x, y, z: 0 }, orientation: quaternionOf(yaw) }, covariance },
     });
-    this.note("info", "page", `2D pose estimate ${x.toFixed(2)} ${y.toFixed(2)} ${yaw.toFixed(2)}`);
+    this.note("info", "page", (t) => `${t("estimated")} ${x.toFixed(2)} ${y.toFixed(2)} ${yaw.toFixed(2)}`);
   }
 
   /** Propose a task, for an operator to complete. */
@@ -348,14 +342,16 @@ export class Station extends EventTarget {
       addPlace(this, x, y, yaw, now);
       return;
     }
-    if (now) this.clear();
+    if (now) this.clear(this.robot);
     this.queue.push({ id: ++this._goals, robot: this.robot, x, y, yaw, state: "waiting" });
     if (now) this.holding = false;
     this._next();
   }
 
   move(id, by) {
-    const from = this.queue.findIndex((goal) => goal.id === id), to = from + by;
+    const from = this.queue.findIndex((goal) => goal.id === id), { robot } = this.queue[from];
+    let to = from + by;
+    while (this.queue[to] && this.queue[to].robot !== robot) to += by; // among its own
     if (this.queue[to]?.state !== "waiting") return;
     [this.queue[from], this.queue[to]] = [this.queue[to], this.queue[from]];
     this.changed();
@@ -368,9 +364,10 @@ export class Station extends EventTarget {
     this.changed();
   }
 
-  clear() {
-    this.queue.filter((goal) => goal.state === "active").forEach((goal) => goal.handle.cancel());
-    this.queue = this.queue.filter((goal) => goal.state === "active");
+  /** Take back what a robot is to do; what others do goes on. */
+  clear(robot) {
+    this.queue.filter((goal) => goal.robot === robot && goal.state === "active").forEach((goal) => goal.handle.cancel());
+    this.queue = this.queue.filter((goal) => goal.robot !== robot || goal.state === "active");
     this.changed();
   }
 
@@ -411,7 +408,7 @@ export class Station extends EventTarget {
     }
     if (goal.state === "failed") {
       this.holding = this.queue.some((each) => each.state === "waiting");
-      this.alarm(`goal ${goal.id}`, "warn", `goal ${goal.x.toFixed(1)}, ${goal.y.toFixed(1)}: ${goal.why || "failed"}`);
+      this.alarm(`goal ${goal.id}`, "warn", (t) => `${goal.robot.name}: ${t("goal")} ${goal.x.toFixed(1)}, ${goal.y.toFixed(1)}: ${t(goal.why || "failed")}`, { isEvent: true });
     }
     this._next();
   }

@@ -132,7 +132,7 @@ function RobotQueue({ station, t }) {
     ${shown.length === 0 && html`<p class="muted">${t("noTasks")}</p>`}
     <ul class="list" id="queue">${shown.map(item)}</ul>
     <${AddTask} station=${station} t=${t} />
-    <p id="said" role="status" class=${said?.refused ? "bad" : "muted"}>${said?.text ?? ""}</p>
+    <p id="said" role="status" class=${said?.refused ? "bad" : "muted"}>${t(said?.text ?? "")}</p>
     <div class="row">${paused ? html`<button id="resume-tasks" class="primary" onClick=${() => askQueue(station, "resume_tasks", TRIGGER)}>${t("resume")}</button>` : html`<button id="pause-tasks" onClick=${() => askQueue(station, "pause_tasks", TRIGGER)}>${t("hold_")}</button>`}
       ${shown.some(({ state }) => state <= ACTIVE) && html`<button id="clear-tasks" onClick=${() => askQueue(station, "clear_tasks", TRIGGER)}>${t("clearTasks")}</button>`}</div>`;
 }
@@ -143,17 +143,19 @@ function PageQueue({ station, t }) {
     const value = (name) => Number(event.target.elements[name].value) || 0;
     station.add(value("x"), value("y"), (value("heading") * Math.PI) / 180);
   };
+  const isOfMany = station.robots.size > 1;
   return html`
     <p class="muted">${t("queueNote")}</p>
     ${station.queue.length === 0 && html`<p class="muted">${t("empty")}</p>`}
     <ul class="list" id="queue">${station.queue.map((goal) => html`<li key=${goal.id} data-state=${goal.state}>
-      <div class="grow"><b>${goal.x.toFixed(2)}, ${goal.y.toFixed(2)}</b> · ${degrees(goal.yaw)}°<br />
-        <span class="state ${goal.state}">${t(goal.state === "waiting" ? "state_waiting" : goal.state)}${goal.state === "active" && goal.left !== undefined ? ` · ${goal.left.toFixed(1)} ${t("left")}` : ""} ${goal.why ?? ""}</span></div>
+      <div class="grow">${isOfMany && html`<span class="badge">${goal.robot.name}</span> `}<b>${goal.x.toFixed(2)}, ${goal.y.toFixed(2)}</b> · ${degrees(goal.yaw)}°<br />
+        <span class="state ${goal.state}">${t(goal.state === "waiting" ? "state_waiting" : goal.state)}${goal.state === "active" && goal.left !== undefined ? ` · ${goal.left.toFixed(1)} ${t("left")}` : ""} ${t(goal.why ?? "")}</span></div>
       ${goal.state === "waiting" && html`<button class="icon" aria-label=${t("earlier")} onClick=${() => station.move(goal.id, -1)}>↑</button><button class="icon" aria-label=${t("later")} onClick=${() => station.move(goal.id, 1)}>↓</button>`}
       <button class="icon" aria-label=${t("cancel")} onClick=${() => station.cancel(goal.id)}>✕</button></li>`)}</ul>
     <form class="row" onSubmit=${add}>
       ${["x", "y", "heading"].map((name) => html`<${Figure} name=${name} label=${t(name)} />`)}
       <button>${t("add")}</button></form>
+    ${isOfMany && html`<p class="muted">${t("goesTo")} ${station.robot?.name}</p>`}
     ${station.holding ? html`<button onClick=${() => station.resumeQueue()}>${t("resume")}</button>` : station.queue.length > 0 && html`<button onClick=${() => station.pauseQueue()}>${t("hold_")}</button>`}`;
 }
 

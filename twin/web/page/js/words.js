@@ -20,6 +20,8 @@ const WORDS = {
     hintGoal: "Click where to go; drag for the heading", hintPose: "Click where the robot is; drag for its heading", hintWaypoint: "Click to add a goal to the queue; drag for the heading", panels: "Panels", tools: "Tools of the map", history: "Steps",
     robotQueue: "Queue of tasks", robotQueueNote: "Kept at the robot: it goes on without this page.", noTasks: "No tasks. Add one, or choose Waypoint and click on the map.", held: "The queue is held", clearTasks: "Cancel all", taskType: "Task", place: "Place", tote: "Tote", to: "To", dock: "Dock", seconds: "Seconds",
     task_drive_to: "Drive to", task_carry: "Carry", task_dock: "Dock at", task_undock: "Undock", task_wait: "Wait", task_waiting: "waiting", task_active: "under way:", task_succeeded: "done", task_failed: "failed:", task_canceled: "cancelled",
+    unreached: "No connection: STOP does not reach the robot from here. Use the button at the robot.", display: "Time and display",
+    estimated: "2D pose estimate", begunAnew: "begun anew", goesTo: "Goals are added for",
     simulation: "Simulation", play: "Play", pause: "Pause", paused: "Paused", step: "Step", fastest: "fastest", reset: "Reset", resetAsk: "Reset the simulation?", resetText: "It begins anew at its start. What has been recorded so far is lost.",
   },
   zh: {
@@ -41,6 +43,8 @@ const WORDS = {
     hintGoal: "点击目的地，拖动设定朝向", hintPose: "点击机器人所在位置，拖动设定朝向", hintWaypoint: "点击添加到队列，拖动设定朝向", panels: "面板", tools: "地图工具", history: "步骤",
     robotQueue: "任务队列", robotQueueNote: "队列保存在机器人端，关闭本页面后仍继续执行。", noTasks: "没有任务。请添加任务，或选择“航点”后点击地图。", held: "队列已暂停", clearTasks: "全部取消", taskType: "任务", place: "地点", tote: "货箱", to: "目的地", dock: "充电桩", seconds: "秒",
     task_drive_to: "驶往", task_carry: "搬运", task_dock: "停靠", task_undock: "离开停靠", task_wait: "等待", task_waiting: "等待中", task_active: "进行中：", task_succeeded: "已完成", task_failed: "失败：", task_canceled: "已取消",
+    unreached: "连接中断：此处的急停无法到达机器人，请使用机器人上的急停按钮。", display: "时间与显示",
+    estimated: "二维位姿估计", begunAnew: "已从头开始", goesTo: "目标添加给：", "connection lost": "连接中断", "not connected": "未连接",
     simulation: "仿真", play: "继续", pause: "暂停", paused: "已暂停", step: "单步", fastest: "最快", reset: "重置", resetAsk: "重置仿真？", resetText: "仿真将从头开始，此前的记录将丢失。",
   },
 };
@@ -52,7 +56,10 @@ export function wordsOf(language) {
   return (key) => WORDS[language][key] ?? key;
 }
 
-/** Return a time [s] as minutes and seconds. */
+const DAY_S = 1e8; // from here on a time is of the calendar
+
+/** Return a time [s] as minutes and seconds, one of the calendar as the time of the day. */
 export function clock(seconds) {
+  if (seconds > DAY_S) return new Date(seconds * 1000).toTimeString().slice(0, 8);
   return seconds === null || seconds === undefined ? "–" : `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }
