@@ -95,6 +95,19 @@ def test_ten_wrong_tokens_lock_an_address_out(tokens: ServerConfig) -> None:
     assert [{key: line[key] for key in wrong} for line in audited] == [wrong] * 10
 
 
+def test_what_a_stranger_sends_after_a_wrong_token_does_no_harm(tokens: ServerConfig) -> None:
+    with serving(tokens) as server:
+        address = server.server.address
+        with connect(address) as client:
+            client.protocol.send_text(json.dumps({"op": "auth", "token": "wrong"}).encode())
+            client.protocol.send_text(json.dumps({"op": "call_service", "service": "/rosapi/topics"}).encode())
+            client.socket.sendall(b"".join(client.protocol.data_to_send()))  # both are there before it closes
+            with pytest.raises(ConnectionClosed):
+                client.recv(timeout=60.0)
+        with connect(f"{address}/?token={SECRETS[1]}") as client:
+            assert topics(client)["result"]
+
+
 def test_more_than_this_computer_needs_a_token() -> None:
     with pytest.raises(BridgeError, match="--token"):
         ServerConfig(address="0.0.0.0")

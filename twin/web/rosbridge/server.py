@@ -260,6 +260,8 @@ class Server:
             if connection.role is None:
                 async with asyncio.timeout(_AUTH_S):
                     await self._authenticate(websocket, connection, peer)
+                if connection.role is None:
+                    return  # what it has sent meanwhile is nobody's
             async for text in websocket:
                 self._take(connection, text)
         except (ConnectionClosed, TimeoutError):

@@ -1,6 +1,7 @@
 /** The hall from above, on a canvas: grids, scan, plan, robots; goals and poses are set by click and drag. */
 
 import { html, useLayoutEffect, useRef } from "ui";
+import { isStale } from "./silence.js";
 import { drawTasks } from "./tasks.js";
 import { compose, place, poseOf, yawOf } from "./transforms.js";
 
@@ -216,6 +217,7 @@ export class MapView {
 
   _robot(c, robot, selected, colour) {
     const { pose } = robot.pose;
+    c.globalAlpha = isStale(this.station, robot) ? 0.4 : 1; // where it was
     const stopped = Boolean(robot.guard?.stoppedBy);
     c.strokeStyle = c.fillStyle = colour(stopped ? "bad" : selected ? "robot" : "muted");
     c.lineWidth = 2;
@@ -233,6 +235,7 @@ export class MapView {
       c.textAlign = "center";
       c.fillText(robot.name, x, y - 20);
     }
+    c.globalAlpha = 1;
   }
 }
 

@@ -1,6 +1,8 @@
 /** What the page knows of robots: found in the graph by types and names of topics, kept as messages come. */
 
 import { Alarms } from "./alarms.js";
+import { Control } from "./control.js";
+import { Pulse, watchSilence } from "./silence.js";
 import { addPlace } from "./tasks.js";
 import { Frames, compose, place, poseOf, quaternionOf } from "./transforms.js";
 import { TiledGrid, WholeGrid } from "./grids.js";
@@ -15,6 +17,10 @@ const GOAL = { name: "navigate_to_pose", type: "nav2_msgs/action/NavigateToPose"
 const SUCCEEDED = 4, CANCELED = 5;
 const STOP_AGAIN_MS = 200;
 const STOP_UNHEARD_MS = 10_000;
+const NOTICE_MS = 8000;
+const TELEOPS = ["guard/teleop", "cmd_vel_teleop", "cmd_vel", "turtle1/cmd_vel"]; // as `twin teleop` looks for them: past a guard nobody drives
+const ROLE_MAY_NOT = /is not for the role|may not steer/; // today, nor ever
+const HAS_CONTROL = /^(.*) has control/;
 
 const seconds = ({ sec, nanosec }) => sec + nanosec * 1e-9;
 
@@ -24,6 +30,7 @@ class Robot {
     this.space = space;
     this.name = space.slice(1) || "robot";
     this.base = "base_footprint";
+    this.pulse = new Pulse();
     this.grids = {}; // map, global, local, or a mask's topic -> a grid of grids.js
     this.forget();
   }
@@ -47,20 +54,22 @@ export class Station extends EventTarget {
   constructor(ros, name) {
     super();
     this.ros = ros;
-    this.name = name;
+    this.control = new Control(this, name);
     this.robots = new Map();
     this.selected = "";
     this.types = new Map(); // topic -> type
     this.log = [];
     this.alarms = new Alarms();
     this.clock = { time: null, factor: null };
-    this.control = null; // twin_msgs/Control, and own id
+    this.notice = null; // {key, words(t)}: of what was refused, for people
     this.queue = []; // {id, x, y, yaw, state: waiting | active | succeeded | canceled | failed, left}
     this.holding = false;
     this._goals = 0;
     this._heard = new Set();
     ros.addEventListener("connection", () => this._connection());
     ros.addEventListener("status", ({ detail }) => this.note(detail.level, "rosbridge", detail.msg));
+    ros.addEventListener("refused", ({ detail }) => this._refused(detail));
+    watchSilence(this);
     setInterval(() => this._look(), GRAPH_MS);
     setInterval(() => this.changed(), 500); // ages of what was heard
   }
@@ -71,7 +80,7 @@ export class Station extends EventTarget {
 
   /** Where something is on the server of the page; the token goes with it. */
   address(path, query) {
-    const token = new URLSearchParams(location.search).get("token");
+    const { token } = this.ros;
     return `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
   }
 
@@ -96,13 +105,48 @@ export class Station extends EventTarget {
     }, 60);
   }
 
+  /** Add a line to the log; what is said again is counted. */
   note(level, source, text, time = this.clock.time) {
-    this.log.unshift({ level, source, text, time, key: ++this._goals });
+    const [last] = this.log;
+    if (last && last.level === level && last.source === source && last.text === text) {
+      Object.assign(last, { time, count: last.count + 1 });
+      this.changed();
+      return;
+    }
+    this.log.unshift({ level, source, text, time, count: 1, key: ++this._goals });
     this.log.length = Math.min(this.log.length, LOG_LINES);
     this.changed();
   }
 
-  /** Raise or end an alarm. */
+  /** Tell people something now; the same is not told again while it is shown. */
+  tell(words) {
+    const text = words((key) => key);
+    if (this.notice?.text !== text) this.notice = { text, words, key: ++this._goals };
+    clearTimeout(this._noticed);
+    this._noticed = setTimeout(() => this.dismiss(), NOTICE_MS);
+    this.changed();
+  }
+
+  dismiss() {
+    this.notice = null;
+    this.changed();
+  }
+
+  /** Tell that a command was refused; `why` is the server's sentence. */
+  refuse(why) {
+    const other = HAS_CONTROL.exec(why)?.[1];
+    this.tell((t) => (other ? `${other} ${t("refusedOther")}` : ROLE_MAY_NOT.test(why) ? `${t("refusedRole")} (${this.control.state?.role ?? ""})` : `${t("refused")}: ${why}`));
+  }
+
+  /** What was published is refused: who repeats it ends that. */
+  _refused({ topic, why }) {
+    this.refuse(why);
+    for (const robot of this.robots.values())
+      if (topic === `${robot.space}/guard/stop` && ROLE_MAY_NOT.test(why)) Object.assign(robot, { stopAsked: 0, stopRefused: true });
+    this.dispatchEvent(new CustomEvent("refused", { detail: topic }));
+  }
+
+  /** Raise or end an alarm, as `Alarms` says. */
   alarm(key, level, text, { time = this.clock.time ?? Date.now() / 1000, ...more } = {}) {
     if (this.alarms.raise(key, level, text, { time, ...more })) this.changed();
   }
@@ -113,9 +157,10 @@ export class Station extends EventTarget {
   }
 
   _connection() {
+    this.robots.forEach((robot) => (robot.stopRefused = false)); // perhaps by another token
     if (this.ros.connected) this._look();
     else this.queue.forEach((goal) => goal.state === "active" && (goal.state = "failed"));
-    this.alarm("connection", "error", (t) => t("connection"), { active: !this.ros.connected });
+    this.alarm("connection", "error", (t) => t("connection"), { active: !this.ros.connected && !this.ros.refused });
     this.changed();
   }
 
@@ -168,6 +213,7 @@ export class Station extends EventTarget {
     if (type === ODOMETRY && last === "odom") {
       const robot = this._robot(space);
       hear((msg) => {
+        robot.pulse.beat();
         robot.base = msg.child_frame_id;
         robot.odometry = msg;
         robot.velocity = { linear: msg.twist.twist.linear.x, angular: msg.twist.twist.angular.z };
@@ -209,7 +255,7 @@ export class Station extends EventTarget {
     else if (type === "twin_msgs/msg/TaskQueue") owned((robot, msg) => (robot.tasks = msg));
     else if (type === "twin_msgs/msg/Places") owned((robot, msg) => (robot.places = msg.places));
     else if (topic === "/simulation/state") hear((msg) => this._simulated(msg));
-    else if (topic === "/twin/control") hear((msg) => (this.control = { ...this.control, ...msg }));
+    else if (topic === "/twin/control") hear((msg) => this.control.told(msg));
   }
 
   /** Show a grid: in tiles if there are some; the local costmap, small and always another, whole. */
@@ -273,7 +319,7 @@ export class Station extends EventTarget {
       robot.stopAsked = performance.now();
       const press = () => {
         if (!robot.stopAsked || (!robot.guard && performance.now() - robot.stopAsked > STOP_UNHEARD_MS)) return;
-        this.ros.publish(`${robot.space}/guard/stop`, "std_msgs/msg/Header", { frame_id: this.name });
+        this.ros.publish(`${robot.space}/guard/stop`, "std_msgs/msg/Header", { frame_id: this.control.signature });
         setTimeout(press, STOP_AGAIN_MS);
       };
       press();
@@ -286,27 +332,27 @@ export class Station extends EventTarget {
   release() {
     for (const robot of this.robots.values())
       if (robot.guard?.stoppedBy)
-        this.ros.publish(`${robot.space}/guard/release`, "std_msgs/msg/Header", { stamp: robot.guard.stamp, frame_id: this.name });
+        this.ros.publish(`${robot.space}/guard/release`, "std_msgs/msg/Header", { stamp: robot.guard.stamp, frame_id: this.control.signature });
   }
 
   get stopped() {
     return [...this.robots.values()].filter((robot) => robot.guard?.stoppedBy);
   }
 
-  async take(command) {
-    try {
-      const { id, ...rest } = await this.ros.call("/twin/control", "twin_msgs/srv/Control", { command, name: this.name });
-      this.control = { ...rest, own: id };
-    } catch (error) {
-      this.note("warn", "control", error.message);
-    }
-    this.changed();
+  /** Whether there is nothing to command: a bag, or a role that only looks. */
+  get watches() {
+    return Boolean(this.history) || this.control.watches;
   }
 
-  /** Topic and type for velocities by hand: before the multiplexer, if there is one. */
+  /** Whether a goal of this page is under way. */
+  get hasGoal() {
+    return this.queue.some(({ state }) => state === "active");
+  }
+
+  /** Topic and type for velocities by hand: before the guard, else the multiplexer, if there is one. */
   get teleop() {
     const space = this.robot?.space ?? "";
-    const topic = ["cmd_vel_teleop", "cmd_vel"].map((name) => `${space}/${name}`).find((name) => this.types.has(name));
+    const topic = TELEOPS.map((name) => `${space}/${name}`).find((name) => this.types.has(name));
     return topic && { topic, type: this.types.get(topic) };
   }
 
@@ -317,16 +363,21 @@ export class Station extends EventTarget {
     return this.ros.publish(topic, type, type.endsWith("TwistStamped") ? { header: { frame_id: this.robot.base }, twist } : twist);
   }
 
-  estimate(x, y, yaw) {
+  async estimate(x, y, yaw) {
     const covariance = new Array(36).fill(0);
     covariance[0] = covariance[7] = 0.25; // as RViz gives it: 0.5 m
     covariance[35] = (Math.PI / 12) ** 2;
     const robot = this.robot;
-    this.ros.publish(`${robot.space}/initialpose`, "geometry_msgs/msg/PoseWithCovarianceStamped", {
-      header: { frame_id: robot.pose.root },
-      pose: { pose: { position: { x, y, z: 0 }, orientation: quaternionOf(yaw) }, covariance },
-    });
-    this.note("info", "page", (t) => `${t("estimated")} ${x.toFixed(2)} ${y.toFixed(2)} ${yaw.toFixed(2)}`);
+    const words = (t) => `${t("estimated")} ${x.toFixed(2)} ${y.toFixed(2)} ${yaw.toFixed(2)}`;
+    try {
+      await this.ros.say(`${robot.space}/initialpose`, "geometry_msgs/msg/PoseWithCovarianceStamped", {
+        header: { frame_id: robot.pose.root },
+        pose: { pose: { position: { x, y, z: 0 }, orientation: quaternionOf(yaw) }, covariance },
+      });
+      this.note("info", "page", words);
+    } catch (error) {
+      this.note("warn", "page", (t) => `${t("refused")}: ${words(t)}: ${error.message}`);
+    }
   }
 
   /** Propose a task, for an operator to complete. */
@@ -406,6 +457,7 @@ export class Station extends EventTarget {
       goal.state = "failed";
       goal.why = error.message;
     }
+    if (HAS_CONTROL.test(goal.why) || ROLE_MAY_NOT.test(goal.why)) this.refuse(goal.why);
     if (goal.state === "failed") {
       this.holding = this.queue.some((each) => each.state === "waiting");
       this.alarm(`goal ${goal.id}`, "warn", (t) => `${goal.robot.name}: ${t("goal")} ${goal.x.toFixed(1)}, ${goal.y.toFixed(1)}: ${t(goal.why || "failed")}`, { isEvent: true });

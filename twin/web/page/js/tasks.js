@@ -18,6 +18,7 @@ export async function askQueue(station, service, type, args = {}) {
     station.said = { text: answer.message, refused: !answer.success };
   } catch (error) {
     station.said = { text: error.message, refused: true };
+    station.refuse(error.message);
   }
   station.changed();
   return !station.said.refused;
@@ -123,17 +124,17 @@ function RobotQueue({ station, t }) {
     };
     return html`<li key=${id} data-state=${STATES[state]} data-id=${id}>
       <div class="grow"><b>${words}</b><br /><span class="state ${STATES[state]}">${t(`task_${STATES[state]}`)} ${state === ACTIVE ? step.replace(/^task \d+: /, "") : error}</span></div>
-      ${state === PENDING && html`${button("earlier", -1)}${button("later", 1)}`}
-      ${state <= ACTIVE && html`<button class="icon" aria-label="${t("cancel")}: ${words}" onClick=${() => askQueue(station, "cancel_task", "twin_msgs/srv/CancelTask", { id })}>✕</button>`}</li>`;
+      ${state === PENDING && !station.watches && html`${button("earlier", -1)}${button("later", 1)}`}
+      ${state <= ACTIVE && !station.watches && html`<button class="icon" aria-label="${t("cancel")}: ${words}" onClick=${() => askQueue(station, "cancel_task", "twin_msgs/srv/CancelTask", { id })}>✕</button>`}</li>`;
   };
   return html`
     <p class="muted">${t("robotQueueNote")}</p>
     ${paused && html`<p id="held" class="warn" role="status">${t("held")}: ${reason}</p>`}
     ${shown.length === 0 && html`<p class="muted">${t("noTasks")}</p>`}
     <ul class="list" id="queue">${shown.map(item)}</ul>
-    <${AddTask} station=${station} t=${t} />
+    ${!station.watches && html`<${AddTask} station=${station} t=${t} />`}
     <p id="said" role="status" class=${said?.refused ? "bad" : "muted"}>${t(said?.text ?? "")}</p>
-    <div class="row">${paused ? html`<button id="resume-tasks" class="primary" onClick=${() => askQueue(station, "resume_tasks", TRIGGER)}>${t("resume")}</button>` : html`<button id="pause-tasks" onClick=${() => askQueue(station, "pause_tasks", TRIGGER)}>${t("hold_")}</button>`}
+    <div class="row" hidden=${station.watches}>${paused ? html`<button id="resume-tasks" class="primary" onClick=${() => askQueue(station, "resume_tasks", TRIGGER)}>${t("resume")}</button>` : html`<button id="pause-tasks" onClick=${() => askQueue(station, "pause_tasks", TRIGGER)}>${t("hold_")}</button>`}
       ${shown.some(({ state }) => state <= ACTIVE) && html`<button id="clear-tasks" onClick=${() => askQueue(station, "clear_tasks", TRIGGER)}>${t("clearTasks")}</button>`}</div>`;
 }
 
@@ -164,6 +165,6 @@ export function Tasks({ station, t }) {
   return html`
     <h3>${t("mission")}</h3>
     ${states.length ? html`<ol class="steps">${states.slice(-8).map((step, i, all) => html`<li class=${i === all.length - 1 ? "now" : ""}><time>${clock(step.time)}</time> ${step.state}</li>`)}</ol>` : html`<p class="muted">${t("noMission")}</p>`}
-    <h3>${t(robot?.tasks ? "robotQueue" : "queue")}</h3>
-    ${robot?.tasks ? html`<${RobotQueue} key=${robot.space} station=${station} t=${t} />` : html`<${PageQueue} station=${station} t=${t} />`}`;
+    ${(robot?.tasks || !station.watches) && html`<h3>${t(robot?.tasks ? "robotQueue" : "queue")}</h3>`}
+    ${robot?.tasks ? html`<${RobotQueue} key=${robot.space} station=${station} t=${t} />` : !station.watches && html`<${PageQueue} station=${station} t=${t} />`}`;
 }
