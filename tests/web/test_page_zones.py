@@ -51,7 +51,9 @@ def test_a_zone_is_drawn_listed_kept_and_removed() -> None:
         page.click("#tool-zone")
         for _theme in range(2):
             page.mouse.move(10, 10)
-            assert page.locator("#zone-add:disabled").evaluate(CONTRAST) > 4.5, "what cannot be pressed yet is read"
+            assert page.locator("#zone-add:disabled").evaluate(CONTRAST) > 4.5, (
+                "what cannot be pressed yet is read"
+            )
             page.click("#theme")
         page.click("#tool-zone")
         corners = ((500, 250), (700, 250), (700, 400), (500, 400))
