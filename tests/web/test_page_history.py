@@ -50,10 +50,12 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 GOODS = """() => {
-    const canvas = document.querySelector('canvas.map'), { width, height } = canvas;
-    const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer), at = [];
+    const canvas = document.querySelector('canvas.map'), { width, height } = canvas, at = [];
+    const image = canvas.getContext('2d').getImageData(0, 0, width, height);
+    const pixels = new Uint32Array(image.data.buffer);
     pixels.forEach((pixel, i) => pixel === 0xff51c4f5 && at.push([i % width, Math.floor(i / width)]));
-    return at.length && [0, 1].map((axis) => Math.round(at.reduce((sum, each) => sum + each[axis], 0) / at.length));
+    const mean = (axis) => Math.round(at.reduce((sum, each) => sum + each[axis], 0) / at.length);
+    return at.length && [mean(0), mean(1)];
 }"""
 """Where the map shows goods [pixels], 0 where it does not."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -48,7 +49,7 @@ def boxes(page: Any, width: int) -> None:
     assert stop["x"] >= 0
     assert stop["x"] + stop["width"] <= width, page.inner_text("header")
     assert stop["width"] >= 90
-    for before, after in zip(shown, shown[1:], strict=False):
+    for before, after in pairwise(shown):
         assert before["x"] + before["width"] <= after["x"] + 1, page.inner_text("header")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 

@@ -68,9 +68,7 @@ def others(address: str) -> Iterator[Callable[..., None]]:
     with connect(address.replace("http://", "ws://").rstrip("/"), max_size=None) as client:
 
         def ask(command: str) -> None:
-            _send(
-                client, op="call_service", service="/twin/control", args={"command": command, "name": "Lin"}
-            )
+            _send(client, op="call_service", service="/twin/control", args={"command": command, "name": "Lin"})
             client.recv(timeout=60.0)
 
         yield ask
@@ -190,9 +188,7 @@ def test_control_is_kept_while_it_is_wanted_and_a_refusal_is_told_once() -> None
         lin("take_over")
         page.wait_for_selector(".notice:has-text('Lin has taken control over')")
         page.wait_for_selector(".stick")
-        page.evaluate(
-            "window.alerts = 0; new MutationObserver(all => all.forEach(({addedNodes}) => addedNodes.forEach(node => alerts += node.getAttribute?.('role') === 'alert'))).observe(document.body, {childList: true, subtree: true})"
-        )
+        page.evaluate("window.alerts = 0; new MutationObserver(all => all.forEach(({addedNodes}) => addedNodes.forEach(node => alerts += node.getAttribute?.('role') === 'alert'))).observe(document.body, {childList: true, subtree: true})")
         began_s = time.monotonic()
         with held(page):
             for _ in range(4):

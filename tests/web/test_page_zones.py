@@ -15,10 +15,12 @@ from twin.web.rosbridge.access import ROLES, Token
 
 CONTRAST = """(element) => {
     const light = (colour) => {
-        const [r, g, b] = colour.match(/[0-9.]+/g).map((value) => value / 255).map((c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+        const linear = (c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+        const [r, g, b] = colour.match(/[0-9.]+/g).map((value) => linear(value / 255));
         return 0.2126 * r + 0.7152 * g + 0.0722 * b;
     };
-    const { color, backgroundColor } = getComputedStyle(element), [a, b] = [light(color), light(backgroundColor)];
+    const { color, backgroundColor } = getComputedStyle(element);
+    const [a, b] = [light(color), light(backgroundColor)];
     return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
 }"""
 """Of an element's text, as WCAG has it; axe leaves out what is disabled."""
