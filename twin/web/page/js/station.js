@@ -142,13 +142,13 @@ export class Station extends EventTarget {
     this.dispatchEvent(new CustomEvent("refused", { detail: topic }));
   }
 
-  /** Raise or end an alarm; `words` gives its text in a language. */
-  alarm(key, level, text, active = true, words = undefined) {
-    const known = this.alarms.get(key);
+  /** Raise or end an alarm; what the page says itself is a function of its words. */
+  alarm(key, level, text, { active = true } = {}) {
+    const known = this.alarms.get(key), plain = (each) => (typeof each === "function" ? each((word) => word) : each);
     if (!active && !known?.active) return;
-    const again = active && !(known?.active && known.text === text && known.level === level);
+    const again = active && !(known?.active && plain(known.text) === plain(text) && known.level === level);
     this.alarms.set(key, {
-      key, level, text: active ? text : known.text, active, words,
+      key, level, text: active ? text : known.text, active,
       time: again ? this.clock.time : known.time,
       acknowledged: again ? false : known.acknowledged,
     });
@@ -166,7 +166,7 @@ export class Station extends EventTarget {
     this.robots.forEach((robot) => (robot.stopRefused = false)); // perhaps by another token
     if (this.ros.connected) this._look();
     else this.queue.forEach((goal) => goal.state === "active" && (goal.state = "failed"));
-    this.alarm("connection", "error", "connection", !this.ros.connected && !this.ros.refused);
+    this.alarm("connection", "error", (t) => t("connection"), { active: !this.ros.connected && !this.ros.refused });
     this.changed();
   }
 
@@ -249,7 +249,7 @@ export class Station extends EventTarget {
       owned((robot, msg) => (robot.spread = Math.sqrt(Math.max(0, msg.pose.covariance[0] + msg.pose.covariance[7]))), 200);
     else if (type === "diagnostic_msgs/msg/DiagnosticArray" && topic.endsWith("guard/status"))
       owned((robot, msg) => this._guard(robot, msg));
-    else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, s.level > 0)));
+    else if (topic === "/diagnostics") hear((msg) => msg.status.forEach((s) => this.alarm(`diagnostics ${s.name}`, s.level > 1 ? "error" : "warn", `${s.name}: ${s.message}`, { active: s.level > 0 })));
     else if (topic === "/rosout")
       hear((msg) => {
         const level = LEVELS[msg.level] ?? "info";
@@ -315,7 +315,7 @@ export class Station extends EventTarget {
     const by = status.values.find(({ key }) => key === "stopped_by")?.value ?? "";
     robot.guard = { stoppedBy: by, stamp: message.header.stamp };
     if (by) robot.stopAsked = 0;
-    this.alarm(`guard ${robot.space}`, "error", `${robot.name}: emergency stop (${by})`, Boolean(by));
+    this.alarm(`guard ${robot.space}`, "error", `${robot.name}: emergency stop (${by})`, { active: Boolean(by) });
   }
 
   /** Press the emergency stop of all robots; said again until each tells that it is stopped, not for ever to one without a guard. */
