@@ -16,7 +16,7 @@ from tests.web.test_page import CHROMIUM, eventually, violations
 from twin.bridge import types
 from twin.bridge.bus import Bus
 from twin.bridge.graph import Graph
-from twin.bridge.msgs import PoseWithCovarianceStamped, Twist, TwistStamped, new
+from twin.bridge.msgs import PoseWithCovarianceStamped, Twist, TwistStamped
 from twin.bridge.qos import LATCHED
 from twin.geometry import Pose2
 from twin.live.guard.gate import GateConfig
@@ -31,6 +31,14 @@ SECRETS = {"viewer": "viewer-0123456789", "operator": "operator-0123456789"}
 TOKENS = tuple(Token(secret, ROLES[role], f"the {role}") for role, secret in SECRETS.items())
 HANG = "() => { const until = Date.now() + 2000; while (Date.now() < until); }"
 HIDE = "hidden => Object.defineProperty(document, 'hidden', {get: () => hidden, configurable: true})"
+SOCKETS = """sockets = [];
+WebSocket = class extends WebSocket { constructor(url) { super(url); sockets.push(this); } };"""
+COUNT_ALERTS = """() => {
+    window.alerts = 0;
+    const count = node => alerts += node.getAttribute?.('role') === 'alert';
+    const watch = new MutationObserver(all => all.forEach(({addedNodes}) => addedNodes.forEach(count)));
+    watch.observe(document.body, {childList: true, subtree: true});
+}"""
 STOPPED_S = 0.6
 
 
@@ -52,6 +60,12 @@ class Heard:
         """Whether somebody has commanded a speed."""
         return any(speed for at_s, speed in self.speeds[topic] if at_s >= since_s)
 
+    def stopped_after_s(self, topic: str) -> float:
+        """How long after the last command to move the zero came."""
+        said = self.speeds[topic]
+        last = max(i for i, (_, speed) in enumerate(said[:-1]) if speed and not said[i + 1][1])
+        return said[last + 1][0] - said[last][0]
+
 
 @contextmanager
 def held(page: Any, key: str = "w") -> Iterator[None]:
@@ -68,7 +82,9 @@ def others(address: str) -> Iterator[Callable[..., None]]:
     with connect(address.replace("http://", "ws://").rstrip("/"), max_size=None) as client:
 
         def ask(command: str) -> None:
-            _send(client, op="call_service", service="/twin/control", args={"command": command, "name": "Lin"})
+            _send(
+                client, op="call_service", service="/twin/control", args={"command": command, "name": "Lin"}
+            )
             client.recv(timeout=60.0)
 
         yield ask
@@ -113,7 +129,9 @@ def test_two_robots_one_falls_silent_and_the_other_is_driven_until_the_page_hang
         heard.listen(bus, "/cmd_vel")
         heard.listen(bus, "/blue/cmd_vel")
 
-    with hall(more=two) as (address, _), opened(address) as page:
+    with hall(more=two) as (address, _), opened("about:blank", ready=False) as page:
+        page.add_init_script(SOCKETS)
+        page.goto(address)
         robots = page.locator("header select")
         eventually(lambda: robots.locator("option").count() == 2, "two robots")
         page.wait_for_selector(".stick")
@@ -122,7 +140,7 @@ def test_two_robots_one_falls_silent_and_the_other_is_driven_until_the_page_hang
         simulation[0](2)
         page.wait_for_selector(".lamp:has-text('Paused')")
         made[0].speaks = False
-        page.wait_for_timeout(3500)
+        page.wait_for_timeout(3000)
         assert page.locator("#robot-silent").count() == 0
         simulation[0](1)
         page.wait_for_selector(".lamp:has-text('robot: silent for')")
@@ -131,7 +149,7 @@ def test_two_robots_one_falls_silent_and_the_other_is_driven_until_the_page_hang
 
         # It is an alarm, in both languages; known, it is counted no more.
         page.click("#tab-alarms")
-        page.wait_for_selector("#alarm-list li:has-text('robot: is silent')")
+        page.wait_for_selector("#alarm-list li:has-text('robot: silent since')")
         assert page.inner_text("#tab-alarms .count") == "1"
         for _theme in range(2):
             assert violations(page) == []
@@ -150,17 +168,26 @@ def test_two_robots_one_falls_silent_and_the_other_is_driven_until_the_page_hang
         page.wait_for_selector("text=按住摇杆")
         with held(page):
             eventually(lambda: heard.moves("/blue/cmd_vel"), "it drives")
-            # A page that hangs is connected, and silent.
-            page.evaluate(HANG)
-            speeds = heard.speeds["/blue/cmd_vel"]
-            last = max(i for i, (_, speed) in enumerate(speeds[:-1]) if speed and not speeds[i + 1][1])
-            assert speeds[last + 1][0] - speeds[last][0] < STOPPED_S
+            page.evaluate(HANG)  # connected, and silent
+            assert heard.stopped_after_s("/blue/cmd_vel") < STOPPED_S
         assert not heard.moves("/cmd_vel"), "the one that was not chosen stands"
 
         made[0].speaks = True
         page.click("#tab-alarms")
         page.wait_for_selector("#alarm-list li:has-text('已结束')")
         page.wait_for_selector(".lamp:has-text('已连接')")
+
+        # A page that has lost its connection drives no more, with a key that is held or without.
+        page.click("#tab-drive")
+        began_s = time.monotonic()
+        with held(page):
+            eventually(lambda: heard.moves("/blue/cmd_vel", began_s), "it drives again")
+            page.evaluate("sockets.forEach(socket => socket.close())")
+            page.wait_for_selector(".lamp:has-text('连接中断')")
+            page.wait_for_selector(".lamp:has-text('已连接')")
+            page.wait_for_timeout(500)
+            assert heard.speeds["/blue/cmd_vel"][-1][1] == 0.0
+            assert heard.stopped_after_s("/blue/cmd_vel") < STOPPED_S
 
 
 def test_control_is_kept_while_it_is_wanted_and_a_refusal_is_told_once() -> None:
@@ -188,7 +215,7 @@ def test_control_is_kept_while_it_is_wanted_and_a_refusal_is_told_once() -> None
         lin("take_over")
         page.wait_for_selector(".notice:has-text('Lin has taken control over')")
         page.wait_for_selector(".stick")
-        page.evaluate("window.alerts = 0; new MutationObserver(all => all.forEach(({addedNodes}) => addedNodes.forEach(node => alerts += node.getAttribute?.('role') === 'alert'))).observe(document.body, {childList: true, subtree: true})")
+        page.evaluate(COUNT_ALERTS)
         began_s = time.monotonic()
         with held(page):
             for _ in range(4):

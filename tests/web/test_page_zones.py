@@ -120,15 +120,14 @@ def test_who_only_watches_sees_zones_and_no_tools_for_them() -> None:
     tokens = tuple(
         Token(secret, ROLES[role], role) for secret, role in zip(SECRETS, ("viewer", "operator"), strict=True)
     )
-    with hall(more=zones, tokens=tokens) as (address, _):
-        with opened(f"{address}?token={SECRETS[1]}") as page:
-            draw(page, ((500, 250), (700, 250), (700, 400)))
-            page.click("#zone-add")
-            page.wait_for_selector("#zone-add", state="detached")
-            page.goto(f"{address}?token={SECRETS[0]}")
-            page.click("#tab-zones")
-            page.wait_for_selector("#zone-list li")
-            assert page.locator("#tool-zone, #zone-draft, #zone-list button:visible").count() == 0
+    with hall(more=zones, tokens=tokens) as (address, _), opened(f"{address}?token={SECRETS[1]}") as page:
+        draw(page, ((500, 250), (700, 250), (700, 400)))
+        page.click("#zone-add")
+        page.wait_for_selector("#zone-add", state="detached")
+        page.goto(f"{address}?token={SECRETS[0]}")
+        page.click("#tab-zones")
+        page.wait_for_selector("#zone-list li")
+        assert page.locator("#tool-zone, #zone-draft, #zone-list button:visible").count() == 0
 
 
 def draw(page: Any, corners: Any, *, is_open: bool = False) -> None:

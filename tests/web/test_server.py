@@ -100,7 +100,9 @@ def test_what_a_stranger_sends_after_a_wrong_token_does_no_harm(tokens: ServerCo
         address = server.server.address
         with connect(address) as client:
             client.protocol.send_text(json.dumps({"op": "auth", "token": "wrong"}).encode())
-            client.protocol.send_text(json.dumps({"op": "call_service", "service": "/rosapi/topics"}).encode())
+            client.protocol.send_text(
+                json.dumps({"op": "call_service", "service": "/rosapi/topics"}).encode()
+            )
             client.socket.sendall(b"".join(client.protocol.data_to_send()))  # both are there before it closes
             with pytest.raises(ConnectionClosed):
                 client.recv(timeout=60.0)

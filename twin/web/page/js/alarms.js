@@ -21,9 +21,9 @@ export class Alarms extends Map { // key -> {key, level, text, time, active, ack
 
   /**
    * Raise an alarm, or end one; returns whether anything is different.
-   * Where its text changes with time, `words` gives that in a language. One with `isEvent` is of a moment and never ends: the same a while later is another.
+   * One with `isEvent` is of a moment and never ends: the same a while later is another.
    */
-  raise(key, level, text, { active = true, time = null, isEvent = false, words } = {}) {
+  raise(key, level, text, { active = true, time = null, isEvent = false } = {}) {
     const known = this.get(key);
     if (!active && !known?.active) return false;
     if (!active) {
@@ -37,7 +37,7 @@ export class Alarms extends Map { // key -> {key, level, text, time, active, ack
       if (known.acknowledged) this._remember(known, (span) => span && { ...span, to: Math.max(span.to, time) });
       return true;
     }
-    const alarm = { key, level, text, words, time, last: time, active, isEvent };
+    const alarm = { key, level, text, time, last: time, active, isEvent };
     this.set(key, { ...alarm, acknowledged: this._span(alarm) !== undefined });
     return true;
   }

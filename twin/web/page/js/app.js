@@ -121,7 +121,7 @@ function Alarms({ station, t }) {
   const alarms = [...station.alarms.values()].sort((a, b) => a.acknowledged - b.acknowledged || b.time - a.time);
   if (!alarms.length) return html`<p class="muted">${t("noAlarms")}</p>`;
   return html`<ul class="list" id="alarm-list">${alarms.map((alarm) => html`<li key=${alarm.key} class="alarm ${alarm.level} ${alarm.acknowledged ? "known" : ""}">
-    <div class="grow"><time>${clock(alarm.time)}</time> ${alarm.words?.(t) ?? said(alarm.text, t)} ${!alarm.active && html`<i>(${t("over")})</i>`}</div>
+    <div class="grow"><time>${clock(alarm.time)}</time> ${said(alarm.text, t)} ${!alarm.active && html`<i>(${t("over")})</i>`}</div>
     ${alarm.acknowledged ? html`<span class="muted">${t("acknowledged")}</span>` : html`<button onClick=${() => station.acknowledge(alarm.key)}>${t("acknowledge")}</button>`}</li>`)}</ul>`;
 }
 

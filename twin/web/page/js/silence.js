@@ -10,6 +10,7 @@ const LATE_MS = 2000; // a page that slept has not heard what was said meanwhile
 export class Pulse {
   constructor() {
     this.heard = this.since = performance.now(); // since: from when silence counts
+    this.time = new Date(); // of the last message, for people
     this.period = 0; // [s]
     this.silent = false;
   }
@@ -18,6 +19,7 @@ export class Pulse {
     const gap = Math.min(this.age, 2 * SILENT_S);
     this.period = this.period ? 0.9 * this.period + 0.1 * gap : gap;
     this.heard = performance.now();
+    this.time = new Date();
     this.silent = false;
   }
 
@@ -49,8 +51,8 @@ export function watchSilence(station) {
     for (const robot of station.robots.values()) {
       if (slept || !station.ros.connected || station.history || stands(station)) robot.pulse.hold();
       else robot.pulse.check(Math.min(1, station.simulation?.speed || 1));
-      const words = (t) => `${robot.name}: ${t("robotSilent")}${robot.pulse.silent ? ` ${robot.pulse.age.toFixed(0)} s` : ""}`;
-      station.alarm(`silent ${robot.space}`, "error", `${robot.name} is silent`, { active: robot.pulse.silent, words });
+      const since = robot.pulse.time.toLocaleTimeString("en-GB"); // while it lasts the text stays, so that it is one alarm
+      station.alarm(`silent ${robot.space}`, "error", (t) => `${robot.name}: ${t("silentSince")} ${since}`, { active: robot.pulse.silent });
     }
   }, LOOK_MS);
 }
