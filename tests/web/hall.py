@@ -22,11 +22,13 @@ from twin.web.rosbridge.server import ServerConfig
 
 
 class Robot:
-    """Publishes `odom`, transforms and a latched map."""
+    """Publishes `odom`, transforms and a latched map, while it `speaks`."""
 
-    def __init__(self, bus: Bus, data: Any, pose: Pose2) -> None:
-        self.node = bus.create_node("robot")
+    def __init__(self, bus: Bus, data: Any, pose: Pose2, namespace: str = "") -> None:
+        self.node = bus.create_node("robot", namespace)
         self.pose = pose
+        self.speaks = True
+        self.prefix = f"{namespace}_" if namespace else ""
         self.odometry = self.node.create_publisher(Odometry, "odom", 1)
         self.transforms = self.node.create_publisher(TFMessage, "/tf", 10)
         self.map = self.node.create_publisher(type(self.grid(data)), "map", LATCHED)
@@ -37,12 +39,14 @@ class Robot:
         return grid_msg(np.asarray(data, np.int8), 0.05, Pose2(-1.0, -1.0, 0.0), "map", self.node.now_ns)
 
     def tell(self) -> None:
-        now_ns = self.node.now_ns
-        message = new(Odometry, header=header(now_ns, "odom"), child_frame_id="base_link")
+        if not self.speaks:
+            return
+        now_ns, odom, base = self.node.now_ns, f"{self.prefix}odom", f"{self.prefix}base_link"
+        message = new(Odometry, header=header(now_ns, odom), child_frame_id=base)
         message.pose.pose = pose_from_pose2(self.pose)
         self.odometry.publish(message)
         links = []
-        for parent, child, pose in (("map", "odom", Pose2(0, 0, 0)), ("odom", "base_link", self.pose)):
+        for parent, child, pose in (("map", odom, Pose2(0, 0, 0)), (odom, base, self.pose)):
             link = new(TransformStamped, header=header(now_ns, parent), child_frame_id=child)
             link.transform.translation.x, link.transform.translation.y = pose.x, pose.y
             link.transform.rotation = pose_from_pose2(pose).orientation

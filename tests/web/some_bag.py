@@ -17,6 +17,7 @@ from twin.bridge.msgs import (
     LaserScan,
     Log,
     Odometry,
+    PoseArray,
     PoseStamped,
     String,
     TFMessage,
@@ -34,6 +35,8 @@ from twin.nodes.navigation.mapping.map_server import grid_msg
 NS = 1_000_000_000
 SECONDS = 60
 MISSION = {5: "to the shelf", 35: "to the dock"}
+TOTE_S = 25
+"""When a tote is seen, from where the robot is then."""
 LINES = {10: "all is well", 50: "a wheel slips"}
 LATCHED = (OfferedQoS(history="keep_last", depth=1, durability="transient_local"),)
 
@@ -75,6 +78,9 @@ def write(folder: Path, storage: Storage = "mcap", seconds: int = SECONDS) -> Pa
             if tenth % 10 == 0 and second in LINES:
                 line = new(Log, stamp=stamp(now_ns), level=40, name="driver", msg=LINES[second])
                 say("/rosout", now_ns, line)
+            if tenth == 10 * TOTE_S:
+                tote = [pose_from_pose2(Pose2(0.8, 0.6, 0.0))]
+                say("/tote_poses", now_ns, PoseArray(header(now_ns, "base_link"), tote))
             if tenth == 300:
                 poses = [new(PoseStamped, pose=pose_from_pose2(Pose2(x, 1.0, 0.0))) for x in (3.0, 4.0, 5.0)]
                 say("/plan", now_ns, PathMsg(header(now_ns, "map"), poses))

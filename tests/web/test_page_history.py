@@ -49,6 +49,17 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     assert targets == {"/rosbag2_player"}, "nobody commanded a robot"
 
 
+GOODS = """() => {
+    const canvas = document.querySelector('canvas.map'), { width, height } = canvas, at = [];
+    const image = canvas.getContext('2d').getImageData(0, 0, width, height);
+    const pixels = new Uint32Array(image.data.buffer);
+    pixels.forEach((pixel, i) => pixel === 0xff51c4f5 && at.push([i % width, Math.floor(i / width)]));
+    const mean = (axis) => Math.round(at.reduce((sum, each) => sum + each[axis], 0) / at.length);
+    return at.length && [mean(0), mean(1)];
+}"""
+"""Where the map shows goods [pixels], 0 where it does not."""
+
+
 def slide(page: Any, seconds: float) -> None:
     script = (
         "(slider, to) => { slider.value = to; slider.dispatchEvent(new Event('input', {bubbles: true})) }"
@@ -75,6 +86,13 @@ def test_the_page_shows_a_bag_as_it_was_and_commands_nothing(address: str) -> No
         assert "a wheel slips" in page.inner_text("ol.log")
         page.click("#tab-alarms")
         assert page.locator("li.alarm").count() == 1
+        assert page.inner_text("li.alarm time") == "0:50", "when it was said, not when it was heard"
+        page.click("li.alarm button")
+        page.reload()
+        page.wait_for_selector("text=History")
+        page.click("#tab-alarms")
+        page.wait_for_selector("li.alarm.known")
+        assert not page.evaluate(GOODS), "where the robot was when it saw them is not known"
 
         slide(page, 20.0)  # back
         eventually(lambda: position(page) == (2.0, 1.5), "the robot is where it was before")
@@ -92,9 +110,24 @@ def test_the_page_shows_a_bag_as_it_was_and_commands_nothing(address: str) -> No
         page.select_option("#rate", "8")
         page.click("#play")
         eventually(lambda: position(page)[0] > 3.0, "it goes on, fast")
+        goods = page.evaluate(GOODS)
+        assert goods
+        eventually(lambda: position(page)[0] > 4.0, "it drives on")
+        assert page.evaluate(GOODS) == goods, "what it saw stays where it was"
         assert re.match(r"\d:\d\d\.\d / 1:00\.0", page.inner_text("#past-now"))
         assert figure(page, 1) == "0.10 m/s"
         page.click("#play")
+
+        # A bag that is paused plots what it said last; a switch of language leaves no word behind.
+        page.click("#tab-plot")
+        page.select_option(".plot >> xpath=../label[1]/select", "/odom")
+        page.wait_for_selector("option[value='twist.twist.linear.x']", state="attached")
+        page.select_option(".plot >> xpath=../label[2]/select", "twist.twist.linear.x")
+        page.hover(".u-over")
+        eventually(lambda: "0.1" in page.inner_text(".plot"), "the last value")
+        page.click("#language")
+        eventually(lambda: "字段" in page.inner_text(".u-legend"), "the legend is in the page's language")
+        page.click("#language")
         for _language in range(2):
             for _theme in range(2):
                 assert violations(page) == []

@@ -96,16 +96,18 @@ def test_ten_wrong_tokens_lock_an_address_out(tokens: ServerConfig) -> None:
     assert [{key: line[key] for key in wrong} for line in audited] == [wrong] * 10
 
 
-def test_who_has_no_token_and_much_to_say_harms_nobody(tokens: ServerConfig) -> None:
+def test_what_a_stranger_sends_after_a_wrong_token_does_no_harm(tokens: ServerConfig) -> None:
     with serving(tokens) as server:
-        for first in ({"op": "call_service", "service": "/rosapi/topics"}, {"op": "auth", "token": "wrong"}):
-            with connect(server.server.address) as client:
-                with contextlib.suppress(ConnectionClosed):
-                    for _ in range(20):
-                        client.send(json.dumps(first))
-                with pytest.raises(ConnectionClosed, match="1008"):
-                    client.recv(timeout=60.0)
-        with connect(f"{server.server.address}/?token={SECRETS[1]}") as client:
+        address = server.server.address
+        with connect(address) as client:
+            client.protocol.send_text(json.dumps({"op": "auth", "token": "wrong"}).encode())
+            client.protocol.send_text(
+                json.dumps({"op": "call_service", "service": "/rosapi/topics"}).encode()
+            )
+            client.socket.sendall(b"".join(client.protocol.data_to_send()))  # both are there before it closes
+            with pytest.raises(ConnectionClosed):
+                client.recv(timeout=60.0)
+        with connect(f"{address}/?token={SECRETS[1]}") as client:
             assert topics(client)["result"]
 
 

@@ -37,6 +37,12 @@ export function Drive({ station, t }) {
       state.pointer = null;
       apply();
     };
+    const refused = ({ detail: topic }) => { // what was not obeyed needs no zero, which would be refused as well
+      if (topic !== station.teleop?.topic) return;
+      clearInterval(state.timer);
+      state.timer = 0;
+      letGo();
+    };
     state.take = (pointer) => {
       state.pointer = pointer;
       apply();
@@ -48,19 +54,20 @@ export function Drive({ station, t }) {
       if (!KEYS[key] || typing(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
       if (key.startsWith("Arrow") && event.target !== stick.current) return; // they scroll elsewhere
       event.preventDefault();
+      if (event.repeat && !state.keys.has(key)) return; // held since before it was refused
       state.keys.add(key);
       apply();
     };
     const up = (event) => {
       if (state.keys.delete(event.key.length === 1 ? event.key.toLowerCase() : event.key)) apply();
     };
-    const listeners = [[window, "keydown", down], [window, "keyup", up], [window, "blur", letGo], [window, "pagehide", letGo], [document, "visibilitychange", hidden], [station.ros, "connection", letGo]];
+    const listeners = [[window, "keydown", down], [window, "keyup", up], [window, "blur", letGo], [window, "pagehide", letGo], [document, "visibilitychange", hidden], [station.ros, "connection", letGo], [station, "refused", refused]];
     listeners.forEach(([target, name, call]) => target.addEventListener(name, call));
     return () => {
       letGo();
       listeners.forEach(([target, name, call]) => target.removeEventListener(name, call));
     };
-  }, []);
+  }, [station.selected]); // what is held was meant for the robot before
 
   const point = (event) => {
     const box = stick.current.getBoundingClientRect(), half = box.width / 2;

@@ -1,10 +1,12 @@
 /** The hall from above, on a canvas: grids, scan, plan, robots; goals and poses are set by click and drag. */
 
 import { html, useLayoutEffect, useRef } from "ui";
+import { isStale } from "./silence.js";
 import { drawTasks } from "./tasks.js";
 import { compose, place, poseOf, yawOf } from "./transforms.js";
 
 const DRAG_PX = 8;
+const LOW_PX = 420;
 const KINDS = ["map", "zones", "global", "local"]; // from below
 
 export class MapView {
@@ -32,9 +34,16 @@ export class MapView {
     const { clientWidth: w, clientHeight: h } = this.canvas;
     if (!grid) return false;
     const { width, height, resolution, origin } = grid.info;
-    this.scale = Math.min(w / (width * resolution), h / (height * resolution)) * 0.94;
-    this.centre = [origin.position.x + width * resolution / 2, origin.position.y + height * resolution / 2];
+    const [top, bottom] = h < LOW_PX ? this._bars(h) : [0, h]; // there is little to see: none of it under buttons
+    this.scale = Math.min(w / (width * resolution), (bottom - top) / (height * resolution)) * 0.94;
+    this.centre = [origin.position.x + width * resolution / 2, origin.position.y + height * resolution / 2 + ((top + bottom - h) / 2) / this.scale];
     return true;
+  }
+
+  /** Between which heights no buttons lie over the map [px]. */
+  _bars(h) {
+    const [top, bottom] = ["top", "bottom"].map((side) => this.canvas.parentElement.querySelector(`.bar.${side}`));
+    return [top ? top.offsetTop + top.offsetHeight : 0, bottom ? bottom.offsetTop : h];
   }
 
   zoom(by) {
@@ -127,7 +136,7 @@ export class MapView {
     this._metres(c, w, h, colour);
     if (this.layers.scan && robot.scan) {
       c.fillStyle = colour("scan");
-      for (const point of robot.scan) {
+      for (const point of robot.scan.placed) {
         const [x, y] = this.pixel(point);
         c.fillRect(x - 1.25, y - 1.25, 2.5, 2.5);
       }
@@ -138,8 +147,8 @@ export class MapView {
       this._line(c, robot.plan.poses.map(({ pose }) => [pose.position.x, pose.position.y]));
     }
     if (this.layers.zones) station.zones.draw(this, c, colour);
-    this._things(c, robot, robot.goods, 0.15, colour("goods"));
-    this._things(c, robot, robot.people, 0.25, colour("people"));
+    this._things(c, robot.goods, 0.15, colour("goods"));
+    this._things(c, robot.people, 0.25, colour("people"));
     drawTasks(c, this, robot, colour);
     station.queue.filter((goal) => goal.state === "active" || goal.state === "waiting").forEach((goal, i) => this._flag(c, [goal.x, goal.y], goal.yaw, colour("accent"), goal.state === "active" ? "" : String(i + 1)));
     for (const each of station.robots.values()) this._robot(c, each, each === robot, colour);
@@ -158,7 +167,8 @@ export class MapView {
   /** A ruler in the corner. */
   _metres(c, w, h, colour) {
     const length = [0.5, 1, 2, 5, 10, 20, 50].find((metres) => metres * this.scale > 60) ?? 100;
-    const left = w - 16 - length * this.scale;
+    const left = w - 16 - length * this.scale, bar = this.canvas.parentElement.querySelector(".bar.bottom");
+    if (bar && bar.offsetLeft + bar.offsetWidth > left - 12) h = bar.offsetTop; // above the buttons, not under them
     c.strokeStyle = c.fillStyle = colour("muted");
     c.lineWidth = 2;
     c.beginPath();
@@ -179,15 +189,12 @@ export class MapView {
     c.stroke();
   }
 
-  _things(c, robot, message, half, colour) {
-    if (!message) return;
+  _things(c, seen, half, colour) {
+    if (!seen) return;
     c.strokeStyle = colour;
     c.lineWidth = 2;
-    const { pose } = robot.frames.lookup(message.header.frame_id);
-    for (const each of message.poses) {
-      const at = compose(pose, poseOf(each));
+    for (const at of seen.placed)
       this._line(c, [[-half, -half], [half, -half], [half, half], [-half, half]].map((corner) => place(at, [...corner, 0])), true);
-    }
   }
 
   _flag(c, at, yaw, colour, text) {
@@ -210,6 +217,7 @@ export class MapView {
 
   _robot(c, robot, selected, colour) {
     const { pose } = robot.pose;
+    c.globalAlpha = isStale(this.station, robot) ? 0.4 : 1; // where it was
     const stopped = Boolean(robot.guard?.stoppedBy);
     c.strokeStyle = c.fillStyle = colour(stopped ? "bad" : selected ? "robot" : "muted");
     c.lineWidth = 2;
@@ -227,6 +235,7 @@ export class MapView {
       c.textAlign = "center";
       c.fillText(robot.name, x, y - 20);
     }
+    c.globalAlpha = 1;
   }
 }
 

@@ -3,6 +3,7 @@
 import { html, useEffect, useRef, useState } from "ui";
 import uPlot from "uplot";
 
+const HEIGHT = 240; // px
 const WINDOW = 600; // samples
 const ELEMENTS = 12; // of an array, that are offered
 
@@ -14,35 +15,53 @@ function numbers(value, path = "", depth = 0) {
   return entries.flatMap(([key, each]) => numbers(each, path ? `${path}.${key}` : String(key), depth + 1));
 }
 
-export function Plot({ station, t }) {
+/** The time now [s]: of the simulation or the bag if there is one. */
+function timeOf({ time, at, factor }) {
+  const now = performance.now() / 1000;
+  return time === null ? now : time + (factor ?? 1) * (now - at);
+}
+
+export function Plot({ station, t, theme }) {
   const [topic, setTopic] = useState(""), [field, setField] = useState(""), [fields, setFields] = useState([]);
-  const box = useRef(), chosen = useRef("");
+  const box = useRef(), chart = useRef(), last = useRef(), samples = useRef([[], []]), chosen = useRef("");
+  const jumps = station.history?.jumps;
   chosen.current = field;
+  const restart = () => chart.current?.setData((samples.current = [[], []]));
+  const draw = () => {
+    if (!chosen.current || !last.current) return;
+    const [x, y] = samples.current, now = timeOf(station.clock);
+    x.push(Math.max(now, x.at(-1) ?? now)); // its estimate may go back a little
+    y.push(chosen.current.split(".").reduce((part, key) => part?.[key], last.current) ?? null);
+    if (x.length > WINDOW) x.shift(), y.shift();
+    chart.current.setData(samples.current);
+  };
+  useEffect(() => {
+    if (!topic) return undefined;
+    const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(`--${name}`).trim();
+    const axis = { stroke: colour("muted"), grid: { stroke: colour("line") } };
+    chart.current = new uPlot({
+      width: box.current.clientWidth, height: HEIGHT, scales: { x: { time: false } }, axes: [axis, axis],
+      series: [{ label: "s" }, { label: t("field"), stroke: colour("accent"), width: 2 }],
+    }, samples.current, box.current);
+    const turned = new ResizeObserver(() => box.current && chart.current.setSize({ width: box.current.clientWidth, height: HEIGHT }));
+    turned.observe(box.current);
+    return () => { turned.disconnect(); chart.current.destroy(); };
+  }, [topic, theme, t("field")]); // in another theme or language the same again
   useEffect(() => {
     setField("");
     setFields([]);
+    last.current = undefined;
     if (!topic) return undefined;
     let known = false;
-    const samples = { field: "", x: [], y: [] };
-    const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const axis = { stroke: colour("muted"), grid: { stroke: colour("line") } };
-    const chart = new uPlot({
-      width: box.current.clientWidth, height: 240, scales: { x: { time: false } }, axes: [axis, axis],
-      series: [{ label: "s" }, { label: t("field"), stroke: colour("accent"), width: 2 }],
-    }, [[], []], box.current);
-    const end = station.ros.subscribe(topic, station.types.get(topic), (message) => {
+    return station.ros.subscribe(topic, station.types.get(topic), (message) => {
       if (!known) setFields(numbers(message));
       known = true;
-      if (!chosen.current) return;
-      if (samples.field !== chosen.current) Object.assign(samples, { field: chosen.current, x: [], y: [] });
-      const value = chosen.current.split(".").reduce((part, key) => part?.[key], message);
-      samples.x.push(station.clock.time === null ? performance.now() / 1000 : station.clock.time + performance.now() / 1000 - station.clock.at);
-      samples.y.push(value ?? null);
-      if (samples.x.length > WINDOW) samples.x.shift(), samples.y.shift();
-      chart.setData([samples.x, samples.y]);
+      last.current = message;
+      draw();
     }, 50);
-    return () => { end(); chart.destroy(); };
   }, [topic]);
+  useEffect(restart, [topic, field, jumps]); // what was at another time in the bag is over
+  useEffect(draw, [field]); // a bag that is paused says no more
   const select = (label, value, all, change) => html`<label class="small">${label}<select value=${value} onChange=${(event) => change(event.target.value)}>
     <option value="">${t("choose")}</option>${all.map((each) => html`<option value=${each}>${each}</option>`)}</select></label>`;
   return html`${select(t("topic"), topic, [...station.types.keys()].sort(), setTopic)} ${select(t("field"), field, fields, setField)}<div ref=${box} class="plot"></div>`;

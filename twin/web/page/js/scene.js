@@ -56,7 +56,7 @@ export function Scene({ station, label }) {
         robot.joints?.name.forEach((name, i) => body.setJointValue(name, robot.joints.position[i]));
       }
       const robot = station.robot;
-      if (robot?.scan) points.geometry.setAttribute("position", new THREE.Float32BufferAttribute(robot.scan.flat(), 3));
+      if (robot?.scan) points.geometry.setAttribute("position", new THREE.Float32BufferAttribute(robot.scan.placed.flat(), 3));
       const map = robot?.grids.map;
       if (map && wallsOf !== `${robot.space} ${map.version}`) {
         const asked = (wallsOf = `${robot.space} ${map.version}`);

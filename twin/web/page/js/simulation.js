@@ -14,6 +14,7 @@ async function ask(station, service, type, args = {}) {
     if (why) station.note("warn", "simulation", why);
   } catch (error) {
     station.note("warn", "simulation", error.message);
+    station.refuse(error.message);
   }
 }
 

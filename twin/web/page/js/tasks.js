@@ -18,6 +18,7 @@ export async function askQueue(station, service, type, args = {}) {
     station.said = { text: answer.message, refused: !answer.success };
   } catch (error) {
     station.said = { text: error.message, refused: true };
+    station.refuse(error.message);
   }
   station.changed();
   return !station.said.refused;
@@ -123,17 +124,17 @@ function RobotQueue({ station, t }) {
     };
     return html`<li key=${id} data-state=${STATES[state]} data-id=${id}>
       <div class="grow"><b>${words}</b><br /><span class="state ${STATES[state]}">${t(`task_${STATES[state]}`)} ${state === ACTIVE ? step.replace(/^task \d+: /, "") : error}</span></div>
-      ${state === PENDING && html`${button("earlier", -1)}${button("later", 1)}`}
-      ${state <= ACTIVE && html`<button class="icon" aria-label="${t("cancel")}: ${words}" onClick=${() => askQueue(station, "cancel_task", "twin_msgs/srv/CancelTask", { id })}>✕</button>`}</li>`;
+      ${state === PENDING && !station.watches && html`${button("earlier", -1)}${button("later", 1)}`}
+      ${state <= ACTIVE && !station.watches && html`<button class="icon" aria-label="${t("cancel")}: ${words}" onClick=${() => askQueue(station, "cancel_task", "twin_msgs/srv/CancelTask", { id })}>✕</button>`}</li>`;
   };
   return html`
     <p class="muted">${t("robotQueueNote")}</p>
     ${paused && html`<p id="held" class="warn" role="status">${t("held")}: ${reason}</p>`}
     ${shown.length === 0 && html`<p class="muted">${t("noTasks")}</p>`}
     <ul class="list" id="queue">${shown.map(item)}</ul>
-    <${AddTask} station=${station} t=${t} />
-    <p id="said" role="status" class=${said?.refused ? "bad" : "muted"}>${said?.text ?? ""}</p>
-    <div class="row">${paused ? html`<button id="resume-tasks" class="primary" onClick=${() => askQueue(station, "resume_tasks", TRIGGER)}>${t("resume")}</button>` : html`<button id="pause-tasks" onClick=${() => askQueue(station, "pause_tasks", TRIGGER)}>${t("hold_")}</button>`}
+    ${!station.watches && html`<${AddTask} station=${station} t=${t} />`}
+    <p id="said" role="status" class=${said?.refused ? "bad" : "muted"}>${t(said?.text ?? "")}</p>
+    <div class="row" hidden=${station.watches}>${paused ? html`<button id="resume-tasks" class="primary" onClick=${() => askQueue(station, "resume_tasks", TRIGGER)}>${t("resume")}</button>` : html`<button id="pause-tasks" onClick=${() => askQueue(station, "pause_tasks", TRIGGER)}>${t("hold_")}</button>`}
       ${shown.some(({ state }) => state <= ACTIVE) && html`<button id="clear-tasks" onClick=${() => askQueue(station, "clear_tasks", TRIGGER)}>${t("clearTasks")}</button>`}</div>`;
 }
 
@@ -143,17 +144,19 @@ function PageQueue({ station, t }) {
     const value = (name) => Number(event.target.elements[name].value) || 0;
     station.add(value("x"), value("y"), (value("heading") * Math.PI) / 180);
   };
+  const isOfMany = station.robots.size > 1;
   return html`
     <p class="muted">${t("queueNote")}</p>
     ${station.queue.length === 0 && html`<p class="muted">${t("empty")}</p>`}
     <ul class="list" id="queue">${station.queue.map((goal) => html`<li key=${goal.id} data-state=${goal.state}>
-      <div class="grow"><b>${goal.x.toFixed(2)}, ${goal.y.toFixed(2)}</b> · ${degrees(goal.yaw)}°<br />
-        <span class="state ${goal.state}">${t(goal.state === "waiting" ? "state_waiting" : goal.state)}${goal.state === "active" && goal.left !== undefined ? ` · ${goal.left.toFixed(1)} ${t("left")}` : ""} ${goal.why ?? ""}</span></div>
+      <div class="grow">${isOfMany && html`<span class="badge">${goal.robot.name}</span> `}<b>${goal.x.toFixed(2)}, ${goal.y.toFixed(2)}</b> · ${degrees(goal.yaw)}°<br />
+        <span class="state ${goal.state}">${t(goal.state === "waiting" ? "state_waiting" : goal.state)}${goal.state === "active" && goal.left !== undefined ? ` · ${goal.left.toFixed(1)} ${t("left")}` : ""} ${t(goal.why ?? "")}</span></div>
       ${goal.state === "waiting" && html`<button class="icon" aria-label=${t("earlier")} onClick=${() => station.move(goal.id, -1)}>↑</button><button class="icon" aria-label=${t("later")} onClick=${() => station.move(goal.id, 1)}>↓</button>`}
       <button class="icon" aria-label=${t("cancel")} onClick=${() => station.cancel(goal.id)}>✕</button></li>`)}</ul>
     <form class="row" onSubmit=${add}>
       ${["x", "y", "heading"].map((name) => html`<${Figure} name=${name} label=${t(name)} />`)}
       <button>${t("add")}</button></form>
+    ${isOfMany && html`<p class="muted">${t("goesTo")} ${station.robot?.name}</p>`}
     ${station.holding ? html`<button onClick=${() => station.resumeQueue()}>${t("resume")}</button>` : station.queue.length > 0 && html`<button onClick=${() => station.pauseQueue()}>${t("hold_")}</button>`}`;
 }
 
@@ -162,6 +165,6 @@ export function Tasks({ station, t }) {
   return html`
     <h3>${t("mission")}</h3>
     ${states.length ? html`<ol class="steps">${states.slice(-8).map((step, i, all) => html`<li class=${i === all.length - 1 ? "now" : ""}><time>${clock(step.time)}</time> ${step.state}</li>`)}</ol>` : html`<p class="muted">${t("noMission")}</p>`}
-    <h3>${t(robot?.tasks ? "robotQueue" : "queue")}</h3>
-    ${robot?.tasks ? html`<${RobotQueue} key=${robot.space} station=${station} t=${t} />` : html`<${PageQueue} station=${station} t=${t} />`}`;
+    ${(robot?.tasks || !station.watches) && html`<h3>${t(robot?.tasks ? "robotQueue" : "queue")}</h3>`}
+    ${robot?.tasks ? html`<${RobotQueue} key=${robot.space} station=${station} t=${t} />` : !station.watches && html`<${PageQueue} station=${station} t=${t} />`}`;
 }

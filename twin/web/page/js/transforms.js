@@ -37,21 +37,54 @@ export function poseOf({ position, translation = position, orientation, rotation
   return { p: [translation.x, translation.y, translation.z], q: [rotation.x, rotation.y, rotation.z, rotation.w] };
 }
 
+const PAST_S = 11; // transforms that are kept: after a jump in a bag ten seconds of them come
+const NEAR_S = 1; // a transform so much later than what it places is still good for it
+
+const seconds = ({ sec, nanosec }) => sec + nanosec * 1e-9;
+
 export class Frames {
   constructor() {
-    this._parents = new Map(); // child -> {parent, pose}
+    this._parents = new Map(); // child -> {parent, pose, time}
+    this._past = new Map(); // child -> the same, the oldest first; not of what never moves
   }
 
-  take(message) {
-    for (const each of message.transforms)
-      this._parents.set(each.child_frame_id, { parent: each.header.frame_id, pose: poseOf(each.transform) });
+  take(message, isStatic = false) {
+    for (const { child_frame_id: child, header, transform } of message.transforms) {
+      const link = { parent: header.frame_id, pose: poseOf(transform), time: seconds(header.stamp) };
+      this._parents.set(child, link);
+      if (isStatic) this._past.delete(child);
+      else this._remember(child, link);
+    }
+  }
+
+  _remember(child, link) {
+    const past = this._past.get(child) ?? [];
+    if (past.length && past.at(-1).time > link.time) past.length = 0; // time begins anew
+    past.push(link);
+    if (past[0].time < link.time - 2 * PAST_S) past.splice(0, past.findIndex(({ time }) => time >= link.time - PAST_S)); // now and then
+    this._past.set(child, past);
   }
 
   /** Return {root, pose}: the frame at the tree's root and where `frame` is in it. */
   lookup(frame) {
+    return this._climb(frame, (child) => this._parents.get(child));
+  }
+
+  /** The same at the time of a stamp; null if it is not known where the frame was then. */
+  at(frame, stamp) {
+    const time = seconds(stamp);
+    return this._climb(frame, (child) => {
+      const past = this._past.get(child);
+      if (!past) return this._parents.get(child);
+      return past.findLast((link) => link.time <= time) ?? (past[0].time - time < NEAR_S ? past[0] : null);
+    });
+  }
+
+  _climb(frame, linkOf) {
     let pose = IDENTITY, root = frame;
     for (let depth = 0; depth < 64 && this._parents.has(root); depth++) {
-      const link = this._parents.get(root);
+      const link = linkOf(root);
+      if (!link) return null;
       pose = compose(link.pose, pose);
       root = link.parent;
     }

@@ -16,10 +16,14 @@ const WORDS = {
     active: "under way", state_waiting: "waiting", succeeded: "arrived", canceled: "cancelled", failed: "failed",
     noAlarms: "No alarms", acknowledge: "Acknowledge", acknowledged: "Acknowledged", over: "over", connection: "The connection to the robot is lost", noLog: "Nothing said yet",
     controlMine: "You have control", controlNone: "Nobody has control", controlOther: "has control", takeOver: "Take over", take: "Take control", giveBack: "Give back", theme: "Dark or light", language: "中文",
+    silentSince: "silent since", controlTaken: "has taken control over", controlOver: "Control is over: it was not renewed", watching: "You watch", who: "Your name", name: "Name", nameNote: "Others see it while you have control, and after a stop. Without one it is that of your token.", keep: "Keep",
+    refused: "Refused", refusedOther: "has control: take over first", refusedRole: "Your role may not do that", close: "Close", token: "Token", tokenAsked: "The server asks for a token", tokenWrong: "The server does not know this token, or has had too many wrong ones: then wait a minute.", tokenNote: "Kept until this tab is closed.", enter: "Come in",
     topic: "Topic", field: "Field", choose: "choose", noCamera: "No camera", mapLabel: "Map of the hall. Arrow keys move it, plus and minus zoom; goals can be typed under Tasks.", sceneLabel: "Robot in three dimensions",
     hintGoal: "Click where to go; drag for the heading", hintPose: "Click where the robot is; drag for its heading", hintWaypoint: "Click to add a goal to the queue; drag for the heading", panels: "Panels", tools: "Tools of the map", history: "Steps",
     robotQueue: "Queue of tasks", robotQueueNote: "Kept at the robot: it goes on without this page.", noTasks: "No tasks. Add one, or choose Waypoint and click on the map.", held: "The queue is held", clearTasks: "Cancel all", taskType: "Task", place: "Place", tote: "Tote", to: "To", dock: "Dock", seconds: "Seconds",
     task_drive_to: "Drive to", task_carry: "Carry", task_dock: "Dock at", task_undock: "Undock", task_wait: "Wait", task_waiting: "waiting", task_active: "under way:", task_succeeded: "done", task_failed: "failed:", task_canceled: "cancelled",
+    unreached: "No connection: STOP does not reach the robot from here. Use the button at the robot.", display: "Time and display",
+    estimated: "2D pose estimate", begunAnew: "begun anew", goesTo: "Goals are added for",
     simulation: "Simulation", play: "Play", pause: "Pause", paused: "Paused", step: "Step", fastest: "fastest", reset: "Reset", resetAsk: "Reset the simulation?", resetText: "It begins anew at its start. What has been recorded so far is lost.",
   },
   zh: {
@@ -37,10 +41,14 @@ const WORDS = {
     active: "进行中", state_waiting: "等待", succeeded: "已到达", canceled: "已取消", failed: "失败",
     noAlarms: "没有报警", acknowledge: "确认", acknowledged: "已确认", over: "已结束", connection: "与机器人的连接中断", noLog: "暂无日志",
     controlMine: "您正在控制", controlNone: "无人控制", controlOther: "正在控制", takeOver: "接管", take: "取得控制", giveBack: "交还", theme: "深色或浅色", language: "English",
+    silentSince: "无消息，始于", controlTaken: "已接管控制", controlOver: "控制已失效：未续期", watching: "仅观看", who: "您的姓名", name: "姓名", nameNote: "控制机器人或急停后，他人会看到此姓名。留空则使用令牌的名称。", keep: "保存",
+    refused: "已拒绝", refusedOther: "正在控制：请先接管", refusedRole: "您的角色无权执行此操作", close: "关闭", token: "令牌", tokenAsked: "服务器要求令牌", tokenWrong: "服务器不认识此令牌，或错误次数过多：请等待一分钟。", tokenNote: "仅保留到关闭此标签页。", enter: "进入",
     topic: "话题", field: "字段", choose: "选择", noCamera: "没有相机", mapLabel: "厂房地图。方向键移动，加减号缩放；也可在任务面板输入目标。", sceneLabel: "机器人三维视图",
     hintGoal: "点击目的地，拖动设定朝向", hintPose: "点击机器人所在位置，拖动设定朝向", hintWaypoint: "点击添加到队列，拖动设定朝向", panels: "面板", tools: "地图工具", history: "步骤",
     robotQueue: "任务队列", robotQueueNote: "队列保存在机器人端，关闭本页面后仍继续执行。", noTasks: "没有任务。请添加任务，或选择“航点”后点击地图。", held: "队列已暂停", clearTasks: "全部取消", taskType: "任务", place: "地点", tote: "货箱", to: "目的地", dock: "充电桩", seconds: "秒",
     task_drive_to: "驶往", task_carry: "搬运", task_dock: "停靠", task_undock: "离开停靠", task_wait: "等待", task_waiting: "等待中", task_active: "进行中：", task_succeeded: "已完成", task_failed: "失败：", task_canceled: "已取消",
+    unreached: "连接中断：此处的急停无法到达机器人，请使用机器人上的急停按钮。", display: "时间与显示",
+    estimated: "二维位姿估计", begunAnew: "已从头开始", goesTo: "目标添加给：", "connection lost": "连接中断", "not connected": "未连接",
     simulation: "仿真", play: "继续", pause: "暂停", paused: "已暂停", step: "单步", fastest: "最快", reset: "重置", resetAsk: "重置仿真？", resetText: "仿真将从头开始，此前的记录将丢失。",
   },
 };
@@ -52,7 +60,10 @@ export function wordsOf(language) {
   return (key) => WORDS[language][key] ?? key;
 }
 
-/** Return a time [s] as minutes and seconds. */
+const DAY_S = 1e8; // from here on a time is of the calendar
+
+/** Return a time [s] as minutes and seconds, one of the calendar as the time of the day. */
 export function clock(seconds) {
+  if (seconds > DAY_S) return new Date(seconds * 1000).toTimeString().slice(0, 8);
   return seconds === null || seconds === undefined ? "–" : `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }

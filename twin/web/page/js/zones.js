@@ -155,8 +155,8 @@ export function ZonesPanel({ station, t }) {
   return html`
     ${zones.shapes.length ? html`<ol class="list" id="zone-list">${zones.shapes.map(({ uuid, corners }, i) => html`<li key=${uuid}><b>${i + 1}</b>
       <span class="grow">${middle(corners).map((value) => value.toFixed(1)).join(", ")} m · ${corners.length} ${t("zoneCorners")}</span>
-      <button aria-label=${`${t("zoneRemove")} ${i + 1}`} onClick=${() => remove(uuid)}>${t(asked === uuid ? "zoneSure" : "zoneRemove")}</button></li>`)}</ol>` : html`<p class="muted">${t("zoneNone")}</p>`}
-    <form onSubmit=${add}><label class="small">${t("zoneLabel")}
+      <button aria-label=${`${t("zoneRemove")} ${i + 1}`} onClick=${() => remove(uuid)} hidden=${station.watches}>${t(asked === uuid ? "zoneSure" : "zoneRemove")}</button></li>`)}</ol>` : html`<p class="muted">${t("zoneNone")}</p>`}
+    ${!station.watches && html`<form onSubmit=${add}><label class="small">${t("zoneLabel")}
       <textarea id="zone-draft" rows="5" value=${zones.draft} onInput=${(event) => zones.type(event.target.value)}></textarea></label>
-      <${Fault} zones=${zones} t=${t} /><button class="primary">${t("zoneAdd")}</button></form>`;
+      <${Fault} zones=${zones} t=${t} /><button class="primary">${t("zoneAdd")}</button></form>`}`;
 }
