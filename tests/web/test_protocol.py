@@ -457,6 +457,8 @@ def test_whom_a_token_names_cannot_be_taken_for_somebody_else(world: World) -> N
     assert anybody.tell("call_service", **take)[0]["values"]["holder"] == "Mei"
     assert bob.tell("call_service", **take)[0]["values"]["holder"] == "Mei (Bob)"
     assert "Mei (Bob) has taken control over" in anybody.heard()[-1]["msg"]
+    renewed = {"service": "/twin/control", "args": {"command": "take", "name": "Mei"}}
+    assert bob.tell("call_service", **renewed)[0]["values"]["success"]  # once a second, and not worth a line
     told = [(line["name"], line["called"]) for line in world.lines]
     assert told == [(f"test #{anybody.session.number}", "Mei"), (f"Bob #{bob.session.number}", "Mei (Bob)")]
 

@@ -195,8 +195,9 @@ class Session:
         if service == CONTROL:
             args = args if isinstance(args, dict) else {}
             command, name = str(args.get("command", "")), str(args.get("name", ""))
+            is_renewal = command == "take" and bridge.control.holder is self
             done, words = bridge.control.ask(self, command, name)
-            if command:
+            if command and not is_renewal:
                 self.audit("control", service, args)
             me = {"success": done, "message": words, "id": self.number, "role": self.role.name}
             self.send_values({**answer, "values": {**me, **bridge.control.state()}, "result": True})
