@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import shutil
 import sys
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from twin.scenario.schema import Scenario
     from twin.scenario.verdict import Verdict
 
-_LOG = logging.getLogger("twin.run")
 NO_OVERRIDES: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -158,7 +156,10 @@ class Simulation(Participant):
     def finish(self) -> Verdict:
         """End the run now, and judge it as it stands. Harmless when repeated.
 
-        What it leaves and cannot write, as the disk is full, is told by the logger `twin.run`.
+        What it leaves beside the verdict and cannot write, as the disk is full, the logger `twin.run` tells.
+
+        Raises:
+            RecordingError: The verdict cannot be written.
         """
         if self._verdict is None:
             run = self._running
@@ -166,10 +167,7 @@ class Simulation(Participant):
                 verdict = replace(run.finish(), command=self._command)
                 self._close(verdict)
                 if self.folder is not None:
-                    try:
-                        verdict.write(self.folder)
-                    except RecordingError as fault:
-                        _LOG.warning("%s", fault)
+                    verdict.write(self.folder)
         return self.verdict
 
     @property

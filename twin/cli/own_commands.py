@@ -80,7 +80,7 @@ TABLE = {
     "tf": Command(_GRAPH, "Transforms: the tree, a frame in another, delays; as tf2_tools.", "ros.tf"),
     "interface": Command(_GRAPH, "Types: list, show, prototypes; as `ros2 interface`.", "ros.interface"),
     "bag": Command(_GRAPH, "Bags: record, play, look, convert; as `ros2 bag`.", "ros.bag"),
-    "cloud": Command(_GRAPH, "Point clouds: look at files, convert, thin, publish, save.", "cloud"),
+    "cloud": Command(_GRAPH, "Point clouds: look at files, convert, thin, move, take apart, publish, save.", "cloud"),
     "map": Command(_NAVIGATION, "Maps: look at them, save, convert, render, draw zones.", "map"),
 }
 # fmt: on
