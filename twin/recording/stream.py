@@ -18,7 +18,7 @@ from twin.files.writing import replaced
 from twin.recording.columns import Chunk, Component, send, sim_time
 from twin.recording.frames import WORLD, Frames
 from twin.recording.live_screen import LiveScreen
-from twin.recording.whole_messages import cut_off
+from twin.recording.whole_messages import cut_off, is_cut
 
 Stream = TypeVar("Stream", bound=rr.RecordingStream)
 
@@ -28,6 +28,8 @@ WALL_CLOCK_METRICS = frozenset(
 """Differ between two equal runs: kept as a property, not in the document, so that contents compare equal."""
 FLUSH_TIMEOUT_S = 60
 """Longest wait for a disk that is slow."""
+_STANDS_S = 10
+"""So long a file that ends within a message may stand still before its writer is taken for dead [s]."""
 _SPARE = 1 << 16
 """Bytes of a file that could not be written on which are given back, for the verdict of the run."""
 _abandoned: list[Any] = []
@@ -168,19 +170,30 @@ def flush(recording: rr.RecordingStream, target: Path | None) -> None:
         return
     if _is_abandoned(recording):
         raise _not_whole(target)
+    sizes: list[int] = []
     for _ in range(FLUSH_TIMEOUT_S):
         try:
             recording.flush(timeout_sec=1.0)
             return
         except RuntimeError as fault:
             if "timed out" not in str(fault) or not _has_room(target.parent):
-                with suppress(OSError):  # the disk is gone
-                    cut_off(target, _SPARE)
                 break
+            sizes.append(_stopped_at(target))
+            if sizes[-1] >= 0 and sizes[-_STANDS_S:] == [sizes[-1]] * _STANDS_S:
+                break
+    with suppress(OSError):  # the disk is gone
+        cut_off(target, _SPARE)
     # When it is collected, or the process ends, Rerun would wait for that writer, too.
     _abandoned.append(recording.inner)
     rr.unregister_shutdown()
     raise _not_whole(target)
+
+
+def _stopped_at(target: Path) -> int:
+    """Return the size of a file that ends within a message [bytes]; -1: of one that does not."""
+    with suppress(OSError):
+        return target.stat().st_size if is_cut(target) else -1
+    return -1
 
 
 def _is_abandoned(recording: rr.RecordingStream) -> bool:
