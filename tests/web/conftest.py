@@ -16,7 +16,7 @@ from twin.web.rosbridge.bridge import Bridge, BridgeConfig
 class Client:
     """A client of a bridge, without a socket."""
 
-    def __init__(self, world: World, role: str, known_as: str) -> None:
+    def __init__(self, world: World, role: str, known_as: str = "") -> None:
         self.frames: list[str | bytes] = []
         self.world = world
         self.session = world.bridge.join(
