@@ -139,7 +139,7 @@ def plane(
             check_ending(output)
             check_file(output, option)
     points: Points = read_cloud(file).reshape(-1)
-    found = fit_plane(points, threshold, np.random.default_rng(seed))
+    found = fit_plane(points, threshold, np.random.Generator(np.random.Philox(seed)))
     for output, kept in ((inliers, found.inliers), (others, ~found.inliers)):
         if output is not None:
             write_cloud(output, points[kept])
