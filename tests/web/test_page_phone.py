@@ -73,7 +73,7 @@ def test_stop_is_seen_whole_and_what_has_happened_is_said(spaces: list[str]) -> 
         page.set_viewport_size({"width": 320, "height": 740})
         page.click("#stop")
         for words in ("Stopping …", "正在停止 …"):
-            assert page.inner_text("#stop") == words
+            eventually(lambda words=words: page.inner_text("#stop") == words, words)
             boxes(page, 320)
             page.click("#language")
         for guard in guards:
