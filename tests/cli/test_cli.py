@@ -32,6 +32,7 @@ from twin.cli.run.batch import run_in_child
 from twin.cli.run.options import RunOptions, parse_overrides
 from twin.cli.run.verdict_table import many_report, verdict_report
 from twin.errors import RecordingError, ScenarioError, SimulationError
+from twin.experiments.suite import run as suite_run
 from twin.experiments.suite.cases import Case
 from twin.files.writing import written_alone
 from twin.models import catalogue
@@ -416,7 +417,7 @@ def test_two_commands_do_not_write_into_one_folder(
     demo: Path, runtime: FakeRuntime, invoke: Invoke, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.setattr("twin.cli.run.batch.run_in_child", _no_run)
-    monkeypatch.setattr("twin.experiments.suite.run.run_all", _no_run)
+    monkeypatch.setattr(suite_run, "run_all", _no_run)
     held = demo.parent / "held"
     held.mkdir()
     (held / "verdict.json").write_text("the other's", encoding="utf-8")
