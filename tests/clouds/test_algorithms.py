@@ -147,6 +147,12 @@ def test_times_are_seconds_after_the_stamp_whichever_driver_tells_them(
     assert coordinates(found).tolist() == [[1, 1, 1]] * 11
 
 
+@pytest.mark.parametrize("told", [5.3, 5.3e9, 1_790_000_000.25, 1.79e18, 0.0])
+def test_a_cloud_that_was_measured_at_once_was_measured_at_its_stamp(told: float) -> None:
+    cloud = with_field(make_points(np.ones((3, 3))), "timestamp", told, "<f8")
+    assert timed(cloud, 5.3)["time"].tolist() == [0.0] * 3
+
+
 def test_a_cloud_that_tells_no_times_is_left_as_it_is() -> None:
     cloud = make_points([(1, 2, 3)])
     assert timed(cloud, 5.0) is cloud

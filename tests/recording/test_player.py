@@ -117,7 +117,7 @@ def test_a_vulkan_driver_that_does_not_work_is_told(
 def test_a_picture_is_by_itself_of_a_runs_start_and_of_the_end_of_what_was_watched(
     recorded: Any, tmp_path: Path
 ) -> None:
-    assert shown_time_s(recorded.path) == 0.0
+    assert shown_time_s(recorded.path) is None
     path = tmp_path / "watched.rrd"
     recording = open_recording(path, WATCH, "graph", rrb.Blueprint())
     for time_s in (3.0, 5.5):

@@ -197,7 +197,13 @@ def test_meshes_of_packages(tmp_path: Path, tokens: ServerConfig) -> None:
         assert refused(server, "/meshes/arm_description/meshes/arm%201.stl")[0] == 401
         with get(server, f"/meshes/arm_description/meshes/arm%201.stl{known}") as answer:
             assert (answer.read(), answer.headers["Content-Type"]) == (b"solid", "model/stl")
-        for path in ("arm_description/secret.txt", "arm_description/../secret.stl", "nobody/a.stl", ""):
+        for path in (
+            "arm_description/secret.txt",
+            "arm_description/../secret.stl",
+            "nobody/a.stl",
+            "a%00b.stl",
+            "",
+        ):
             assert refused(server, f"/meshes/{path}{known}")[0] == 404
     with serving(ServerConfig(port=0)) as server:
         assert refused(server, "/meshes/arm_description/meshes/arm%201.stl") == (

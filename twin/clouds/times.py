@@ -17,7 +17,7 @@ def timed(points: Points, stamp: float) -> Points:
 
     Drivers tell seconds or nanoseconds, and since the stamp or since the clock began. Numbers with a fraction
     whose range is at most two seconds are seconds, all others nanoseconds; they count from what is nearer to
-    the first of them.
+    the first of them. Where all are the same the cloud was measured at once, at its stamp.
 
     Args:
         points: With one of `TIME_FIELDS`.
@@ -31,11 +31,12 @@ def timed(points: Points, stamp: float) -> Points:
     finite = told[np.isfinite(told)]
     if not len(finite):
         return points
-    first = float(finite.min())
-    is_s = points.dtype[name].kind == "f" and float(finite.max()) - first <= _LONGEST_S
+    first, last = float(finite.min()), float(finite.max())
+    is_s = points.dtype[name].kind == "f" and last - first <= _LONGEST_S
     unit = 1.0 if is_s else 1e-9
-    since_clock = abs(first * unit - stamp) < abs(first * unit)
-    after = (told - first) * unit + (first * unit - (stamp if since_clock else 0.0))
+    begin = first * unit
+    begin -= stamp if abs(begin - stamp) < abs(begin) else 0.0
+    after = (told - first) * unit + (begin if last > first else 0.0)
     made = np.empty(
         points.shape, [*(one for one in scalar_fields(points.dtype) if one[0] != "time"), ("time", "<f8")]
     )

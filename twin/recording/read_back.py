@@ -165,8 +165,8 @@ def check_whole(path: Path) -> None:
         )
 
 
-def shown_time_s(path: Path) -> float:
-    """Return the time [s] that a picture of a recording shows by itself: the end of a graph, a run's start.
+def shown_time_s(path: Path) -> float | None:
+    """Return the time [s] that a picture of a recording shows by itself: a graph's end; None: a run's start.
 
     A graph that is watched shows what was said latest, and perhaps nothing at its start.
 
@@ -175,17 +175,15 @@ def shown_time_s(path: Path) -> float:
     """
     reader = _reader(path)
     store = _stores(reader, path)[0]
+    if store.application_id != WATCH:
+        return None
     times = [
         moments
         for chunk in reader.stream(store=store)
         for _, moments, _ in _components(chunk.to_record_batch())
         if moments is not None and len(moments)
     ]
-    if not times:
-        return 0.0
-    if store.application_id == WATCH:
-        return float(max(moments.max() for moments in times)) * 1e-9
-    return float(min(moments.min() for moments in times)) * 1e-9
+    return float(max((moments.max() for moments in times), default=0)) * 1e-9
 
 
 def read(path: Path) -> Recording:

@@ -25,8 +25,8 @@ class FollowerConfig:
     """How hard it follows."""
 
     max_speed: float = 0.45
-    """Of a correction [m/s], beside what the robot drives; 0.5 is the most it may, and seen from outside it
-    came to 7 % more in ten minutes."""
+    """Of a correction [m/s], beside what the robot drives; 0.5 is the most it may. With 0.5 ten minutes had,
+    seen from outside, 7 % more."""
     max_turn: float = 0.9
     """Of a correction [rad/s]; 1 is the most it may."""
     gain: float = 10.0

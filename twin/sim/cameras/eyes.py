@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, NamedTuple, Self, TypeVar
 
 import mujoco
@@ -184,6 +184,13 @@ class Eyes:
         clip.znear, clip.zfar = near / extent, far / extent
         return near, far
 
+    @cached_property
+    def _owners(self) -> list[str]:
+        """Whose each geom of the world is: a robot's, or that of a body or static."""
+        names, robots = self._world.geom_owners(self._world.model)
+        known = list(self._world.robots)
+        return [name if robot < 0 else known[robot] for name, robot in zip(names, robots, strict=True)]
+
     def _look_around(self, camera: Camera) -> None:
         """Tell, once for each camera, that it has come into something that is not of its own robot."""
         if id(camera) in self._enclosed:
@@ -191,8 +198,7 @@ class Eyes:
         world, name = self._world, camera.mount.robot
         point = self._data.cam_xpos[self._views[id(camera)][0].fixedcamid]
         for geom in enclosing(world.model, world.data, point):
-            owners, robots = world.geom_owners(world.model)
-            owner = owners[geom] if robots[geom] < 0 else list(world.robots)[robots[geom]]
+            owner = self._owners[geom]  # mostly the robot that carries it, so this is asked for each picture
             if owner != name:
                 self._enclosed.add(id(camera))
                 said = f"camera '{camera.spec.name}' of {name} is inside {owner}"

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from twin.errors import BridgeError
-from twin.web.assets import Assets
 from twin.web.rosbridge.access import Role
 from twin.web.rosbridge.bridge import Limits
 from twin.web.rosbridge.door import Door, given_token, peer_of
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
+    from twin.web.assets import Assets
     from twin.web.rosbridge.server import ServerConfig
 
 _STREAM, _SNAPSHOT, _TILES, _MESHES = "/stream", "/snapshot", "/tiles.json", "/meshes/"
@@ -46,6 +46,8 @@ class Http:
         self._connected = connected
         self._maps = Maps(ask)
         self._rates: dict[str, Bucket] = {}
+        self._assets: Assets | None = None
+        self._reads = asyncio.Lock()  # packages are looked for on the way, by one at a time
 
     async def answer(self, connection: ServerConnection, request: Request) -> Page | None:
         """Return the answer to a GET; None: it is not for what is served here."""
@@ -112,7 +114,12 @@ class Http:
         """Return a file of a ROS package: PACKAGE/PATH, as `package://` has it."""
         if self._config.packages is None:
             return refusal(404, "this server gives no meshes")
-        content = await asyncio.to_thread(Assets(self._config.packages).read, f"package://{path}")
+        async with self._reads:
+            if self._assets is None:
+                from twin.web.assets import Assets  # robot files are nothing that others wait for
+
+                self._assets = Assets(self._config.packages)
+            content = await asyncio.to_thread(self._assets.read, f"package://{path}")
         if content is None:
             return refusal(404, f"no mesh or picture is known as package://{path[:200]}")
         return Page(200, content_type(path), content)
