@@ -73,6 +73,52 @@ def test_a_topic_is_encoded_once_for_all(world: World, monkeypatch: pytest.Monke
     assert len(encoded) == 1
 
 
+def test_who_comes_goes_and_asks_anew_hears_what_is_meant_for_it(world: World) -> None:
+    first, second, third = clients = [world.client() for _ in range(3)]
+    publisher = world.bus.create_node("talker").create_publisher(String, "/chatter")
+
+    def say(text: str) -> list[list[str]]:
+        publisher.publish(String(text))
+        world.spin()
+        return [[each["msg"]["data"] for each in client.heard()] for client in clients]
+
+    for client in (first, second):
+        client.tell("subscribe", topic="/chatter", id="one")
+    assert say("a") == [["a"], ["a"], []]
+    third.tell("subscribe", topic="/chatter", throttle_rate=100_000)
+    assert say("b") == [["b"], ["b"], ["b"]]
+    assert say("c") == [["c"], ["c"], []], "it comes too early for the third"
+    third.tell("subscribe", topic="/chatter")
+    assert say("d") == [["d"], ["d"], ["d"]], "its second subscription wants all"
+    first.tell("unsubscribe", topic="/chatter", id="one")
+    assert say("e") == [[], ["e"], ["e"]]
+    second.session.close()
+    assert say("f") == [[], [], ["f"]]
+    first.tell("subscribe", topic="/chatter")
+    second = clients[1] = world.client()
+    second.tell("subscribe", topic="/chatter", compression="png")
+    publisher.publish(String("g"))
+    world.spin()
+    assert [[each["op"] for each in client.heard()] for client in clients] == [
+        ["publish"],
+        ["png"],
+        ["publish"],
+    ]
+
+
+def test_all_who_expect_another_type_are_told_once(world: World) -> None:
+    clients = [world.client() for _ in range(2)]
+    for client in clients:
+        client.tell("subscribe", topic="/chatter", type=TWIST)
+    publisher = world.bus.create_node("talker").create_publisher(String, "/chatter")
+    for text in "ab":
+        publisher.publish(String(text))
+    world.spin()
+    for client in clients:
+        (told,) = errors(client.heard())
+        assert "has the type std_msgs/msg/String, not geometry_msgs/msg/Twist" in told
+
+
 def test_throttle_and_queue(world: World) -> None:
     plain, queued = world.client(), world.client()
     plain.tell("subscribe", topic="/chatter", type="std_msgs/String", throttle_rate=100)

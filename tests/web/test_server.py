@@ -311,6 +311,28 @@ def test_a_stop_is_done_between_two_messages_of_many_that_have_come() -> None:
     assert order == [*map(str, range(11)), "stop", *map(str, range(11, 100))]
 
 
+def test_what_goes_to_several_clients_comes_to_each_in_order() -> None:
+    publishers: list[Any] = []
+
+    def nodes(bus: Bus) -> None:
+        publishers.append(bus.create_node("talker").create_publisher(String, "/chatter", 1000))
+
+    def numbers(client: ClientConnection, most: int) -> list[str]:
+        return [json.loads(client.recv(timeout=60.0))["msg"]["data"] for _ in range(most)]
+
+    with serving(ServerConfig(port=0), nodes=nodes) as rosbridge, contextlib.ExitStack() as stack:
+        address = rosbridge.server.address
+        clients = [stack.enter_context(connect(address)) for _ in range(4)]
+        for client in clients:
+            client.send(json.dumps({"op": "subscribe", "topic": "/chatter"}))
+            topics(client)  # was answered after it
+        rosbridge.server.ask(lambda bridge: [publishers[0].publish(String(str(n))) for n in range(30)])
+        heard = [numbers(client, 10) for client in clients]
+        clients.pop().close()
+        heard = [each + numbers(client, 20) for each, client in zip(heard, clients, strict=False)]
+    assert heard == [[str(number) for number in range(30)]] * 3
+
+
 def test_all_that_waits_for_a_client_goes_out_in_one_write() -> None:
     protocol, written = ServerProtocol(), []
     protocol.state = State.OPEN
@@ -318,16 +340,16 @@ def test_all_that_waits_for_a_client_goes_out_in_one_write() -> None:
     transport = SimpleNamespace(write=written.append, get_write_buffer_size=lambda: filled)
     outbox = Outbox(10_000_000)
     recipient = Recipient(SimpleNamespace(protocol=protocol, transport=transport), outbox)  # type: ignore[arg-type]
-    for frame, topic in (("text", "/a"), (b"binary", "/b"), ("answer", None)):
+    for frame, topic in ((b"text", "/a"), (b"binary", "/b"), (b"answer", None)):
         outbox.put(frame, topic)
-    assert recipient.write({})
-    assert written == [b"\x81\x06answer" + b"\x81\x04text" + b"\x82\x06binary"]
-    assert recipient.write({})
+    assert recipient.write()
+    assert written == [b"answertextbinary"]
+    assert recipient.write()
     assert len(written) == 1, "nothing is left"
     filled = 1_000_000
-    assert recipient.write({}), "nothing waits, so nobody does, however much is on its way"
-    outbox.put("later", "/a")
-    assert not recipient.write({})
+    assert recipient.write(), "nothing waits, so nobody does, however much is on its way"
+    outbox.put(b"later", "/a")
+    assert not recipient.write()
     assert len(written) == 1, "a client that does not keep up is waited for"
 
 
@@ -376,7 +398,7 @@ def test_who_reads_nothing_is_given_up_and_others_hear() -> None:
 
             def is_gone() -> bool:
                 reader.recv(timeout=60.0)
-                waiting.extend(c.outbox._bytes for c in tuple(server.server.connections))
+                waiting.extend(c.recipient.outbox._bytes for c in tuple(server.server.connections))
                 return len(server.server.connections) == 1
 
             wait_for(is_gone)
@@ -400,20 +422,25 @@ def test_a_large_message_that_somebody_does_not_read_holds_up_nobody() -> None:
             time.sleep(0.02)
 
 
-def test_newer_messages_win() -> None:
+@pytest.mark.parametrize("at_once", [1, 100, 1_000_000])
+def test_newer_messages_win(at_once: int) -> None:
     outbox = Outbox(1000)
-    for number in range(100):
-        outbox.put(str(number), "/a")
-    outbox.put("other", "/b")
-    outbox.put("answer", None)
-    taken = []
-    while (frame := outbox.take()) is not None:
-        taken.append(frame)
-    assert taken[0] == "answer"
-    assert taken[1:] == [*(str(number) for number in range(68, 100)), "other"]
-    outbox.put("x" * 900, "/a")
-    outbox.put("y" * 900, "/b")
-    assert outbox.take() == "y" * 900
+
+    def taken() -> list[bytes]:
+        frames = []
+        while found := outbox.take_up_to(at_once):
+            frames += found
+        return frames
+
+    for _ in range(2):  # what was taken leaves nothing behind
+        for number in range(100):
+            outbox.put(b"%d" % number, "/a")
+        outbox.put(b"other", "/b")
+        outbox.put(b"answer", None)
+        assert taken() == [b"answer", *(b"%d" % number for number in range(68, 100)), b"other"]
+    outbox.put(b"x" * 900, "/a")
+    outbox.put(b"y" * 900, "/b")
+    assert taken() == [b"y" * 900]
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")

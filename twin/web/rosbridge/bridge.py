@@ -14,7 +14,7 @@ from twin.bridge.graph import Graph
 from twin.web.rosbridge.access import BY_HAND, EVERYTHING, ROLES, RefusedError, Role
 from twin.web.rosbridge.calls import Calls
 from twin.web.rosbridge.control import Control, ControlConfig
-from twin.web.rosbridge.frames import Frame
+from twin.web.rosbridge.frames import Send
 from twin.web.rosbridge.goals import Goals
 from twin.web.rosbridge.history import History
 from twin.web.rosbridge.learner import Learner
@@ -90,9 +90,7 @@ class Bridge:
             self._history is not None and self._history.is_waiting
         )
 
-    def join(
-        self, name: str, role: Role, send: Callable[[Frame, str | None], None], *, is_known: bool = False
-    ) -> Session:
+    def join(self, name: str, role: Role, send: Send, *, is_known: bool = False) -> Session:
         """Return the session of a new client, whose name a token may tell."""
         self._count += 1
         session = Session(self, self._count, name, role, send, is_known=is_known)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from twin.web.rosbridge.frames import Frame
@@ -19,26 +20,30 @@ _EVERY_S = 0.01
 
 
 class Delivery:
-    """The loop's side; `wake` is for any thread.
+    """The loop's side; `post` is for any thread.
 
     Twenty clients with all topics of a warehouse are ten thousand frames a second: a task that wakes up and
-    a system call for each of them cost more than everything else.
+    a system call for each of them cost more than everything else, so what comes close together goes out
+    together, and a message for all of them is posted once.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, stalled_s: float) -> None:
         """Deliver in a loop; a client that reads nothing for `stalled_s` is disconnected."""
         self._loop, self._stalled_s = loop, stalled_s
-        self._filled: deque[Recipient] = deque()
+        self._posted: deque[tuple[Frame, str | None, Sequence[Recipient]]] = deque()
         self._is_called = False
         self._last_s = 0.0
 
-    def wake(self, recipient: Recipient) -> None:
-        """Let what waits for a client go out; called in any thread, after it was put into the outbox."""
-        # Flags are taken back before what they stand for is looked at: nothing is left lying.
-        if recipient.is_filled:
-            return
-        recipient.is_filled = True
-        self._filled.append(recipient)
+    def post(self, frame: Frame, topic: str | None, recipients: Sequence[Recipient]) -> None:
+        """Let a frame go out to all of these; called in any thread.
+
+        Args:
+            frame: It is packed once.
+            topic: That it is a message of; an answer is of none.
+            recipients: To whom.
+        """
+        # The flag is taken back before what it stands for is looked at: nothing is left lying.
+        self._posted.append((frame, topic, recipients))
         if not self._is_called:
             self._is_called = True
             try:
@@ -53,11 +58,17 @@ class Delivery:
             return
         self._last_s = now_s
         self._is_called = False
-        packed: dict[int, tuple[Frame, bytes]] = {}
-        while self._filled:
-            recipient = self._filled.popleft()
-            recipient.is_filled = False
-            if recipient.waiting is None and not recipient.write(packed):
+        reached: dict[Recipient, None] = {}
+        last, packed = None, b""
+        while self._posted:
+            frame, topic, recipients = self._posted.popleft()
+            if frame is not last:  # one that goes out in different ways is posted several times in a row
+                last, packed = frame, _packed(frame)
+            for recipient in recipients:
+                recipient.outbox.put(packed, topic)
+            reached.update(dict.fromkeys(recipients))
+        for recipient in reached:
+            if recipient.waiting is None and not recipient.write():
                 recipient.waiting = asyncio.create_task(recipient.wait(self._stalled_s))
 
 
@@ -65,49 +76,34 @@ class Recipient:
     """A websocket and what waits for it."""
 
     def __init__(self, websocket: ServerConnection, outbox: Outbox) -> None:
-        self.is_filled = False
-        """Whether a delivery is due."""
+        self.outbox = outbox
         self.waiting: asyncio.Task[None] | None = None
         """Of a client that does not keep up."""
-        self._websocket, self._outbox = websocket, outbox
+        self._websocket = websocket
 
-    def write(self, packed: dict[int, tuple[Frame, bytes]]) -> bool:
-        """Write what waits; return whether that was all.
-
-        Args:
-            packed: Bytes of frames that go to several clients, by identity, with the frames: what is there is
-                not made again.
-        """
+    def write(self) -> bool:
+        """Write what waits; return whether that was all."""
         from websockets.protocol import State
 
-        websocket, outbox = self._websocket, self._outbox
-        protocol, transport = websocket.protocol, websocket.transport
+        outbox, protocol, transport = self.outbox, self._websocket.protocol, self._websocket.transport
         while not outbox.is_empty and protocol.state is State.OPEN:
             if outbox.is_overfull or transport.get_write_buffer_size() >= _BATCH_BYTES:
                 return False
-            frames = outbox.take_up_to(_BATCH_BYTES)
-            for frame in frames:
-                if id(frame) not in packed:
-                    packed[id(frame)] = frame, _packed(frame)
-            transport.write(b"".join([packed[id(frame)][1] for frame in frames]))
+            transport.write(b"".join(outbox.take_up_to(_BATCH_BYTES)))
         return True
 
     async def wait(self, stalled_s: float) -> None:
         """Write as fast as the client reads, until nothing waits; disconnect one that reads nothing."""
-        from websockets.exceptions import ConnectionClosed
-
+        now_s, transport = asyncio.get_running_loop().time, self._websocket.transport
+        left, since_s = -1, now_s()
         try:
-            while not self.write({}):
-                frame = self._outbox.take()
-                if self._outbox.is_overfull:
-                    raise TimeoutError
-                if frame is not None:
-                    async with asyncio.timeout(stalled_s):
-                        await self._websocket.send(frame)
-        except TimeoutError:
-            self._websocket.transport.abort()  # it reads nothing: a closing handshake would wait for it
-        except ConnectionClosed:
-            pass
+            while not self.write():
+                if (size := transport.get_write_buffer_size()) != left:
+                    left, since_s = size, now_s()
+                if self.outbox.is_overfull or now_s() - since_s > stalled_s:
+                    transport.abort()  # it reads nothing: a closing handshake would wait for it
+                    return
+                await asyncio.sleep(_EVERY_S)
         finally:
             self.waiting = None
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
 
 from twin.errors import BridgeError
-from twin.web.rosbridge.frames import COMPRESSIONS, Compression, Frame, Heard, in_fragments
+from twin.web.rosbridge.frames import COMPRESSIONS, Compression, Frame, Heard, Send, in_fragments
 
 _numbers = count(1)
 
@@ -28,9 +28,7 @@ class Wanted:
 class Flow:
     """What one client hears of one topic; several subscriptions count as one, as in rosbridge_library."""
 
-    def __init__(
-        self, topic: str, send: Callable[[Frame, str | None], None], fault: Callable[[str], None]
-    ) -> None:
+    def __init__(self, topic: str, send: Send, fault: Callable[[str], None]) -> None:
         self.type: str | None = None
         """What the client expects."""
         self.late: dict[Flow, None] = {}
@@ -44,6 +42,14 @@ class Flow:
         self._last_s = float("-inf")
         self._queue: deque[Heard] = deque()
         self._told = ""
+
+    @property
+    def at_once(self) -> tuple[str | None, Compression] | None:
+        """Type and compression, if each message goes out as it comes and whole; who has the same is alike."""
+        wanted = self._in_all
+        if not self._wanted or wanted.throttle_s > 0.0 or wanted.fragment_size is not None:
+            return None
+        return self.type, wanted.compression
 
     def want(self, key: str | None, wanted: Wanted) -> None:
         """Add what a `subscribe` of an id asks for, or change it."""
@@ -96,15 +102,27 @@ class Flow:
         self._queue.clear()
         self.late.pop(self, None)
 
+    def frame_of(self, heard: Heard) -> Frame:
+        """Return what the client gets of a message.
+
+        Raises:
+            BridgeError: it has another type than the client expects, or no frame can be made of it.
+        """
+        if self.type is not None and self.type != heard.sample.type:
+            raise BridgeError(f"{heard.sample.topic} has the type {heard.sample.type}, not {self.type}")
+        return heard.frame(self._in_all.compression)
+
+    def tell(self, fault: str) -> None:
+        """Tell the client why it hears nothing, once."""
+        if fault != self._told:
+            self._told = fault
+            self._fault(fault)
+
     def _pass(self, heard: Heard) -> None:
         try:
-            if self.type is not None and self.type != heard.sample.type:
-                raise BridgeError(f"{heard.sample.topic} has the type {heard.sample.type}, not {self.type}")
-            frame = heard.frame(self._in_all.compression)
+            frame = self.frame_of(heard)
         except BridgeError as error:
-            if str(error) != self._told:
-                self._told = str(error)
-                self._fault(self._told)
+            self.tell(str(error))
             return
         size = self._in_all.fragment_size
         if size is None:
@@ -112,6 +130,24 @@ class Flow:
             return
         for piece in in_fragments(frame, size, next(_numbers)):
             self._send(piece, self._topic)
+
+
+class Crowd:
+    """Flows of a topic that are `at_once` in the same way: a frame goes to all of them in one call."""
+
+    def __init__(self, topic: str, flows: Sequence[Flow], send: Send) -> None:
+        """Take flows, at least one, and what sends to all of their clients."""
+        self._topic, self._flows, self._send = topic, flows, send
+
+    def offer(self, heard: Heard) -> None:
+        """Send a message."""
+        try:
+            frame = self._flows[0].frame_of(heard)
+        except BridgeError as error:
+            for flow in self._flows:
+                flow.tell(str(error))
+        else:
+            self._send(frame, self._topic)
 
 
 class Watch(Flow):

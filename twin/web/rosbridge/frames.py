@@ -19,6 +19,8 @@ Compression = Literal["none", "png", "cbor", "cbor-raw"]
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
 Frame = str | bytes
 """A text frame, or a binary one."""
+Send = Callable[[Frame, str | None], None]
+"""Takes a frame, and the topic that it is of: of a topic newer ones may take its place."""
 
 H = TypeVar("H", bound=Hashable)
 _NS = 1_000_000_000

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
-
-from twin.web.rosbridge.frames import Frame
 
 _MOST_OF_A_TOPIC = 32
 _MOST_ANSWERS = 2000
 
 
 class Outbox:
-    """Filled by the bridge's thread, emptied by the server's."""
+    """Frames as they travel; filled and emptied in the server's thread."""
 
     def __init__(self, most_bytes: int) -> None:
         self.dropped = 0
@@ -20,51 +17,50 @@ class Outbox:
         self.is_overfull = False
         """Whether so many answers wait that the client is to be given up."""
         self._most_bytes = most_bytes
-        self._lock = threading.Lock()
-        self._answers: deque[Frame] = deque()
-        self._messages: deque[tuple[str, Frame]] = deque()
+        self._answers: deque[bytes] = deque()
+        self._messages: deque[tuple[str, bytes]] = deque()
         self._counts: dict[str, int] = {}
         self._bytes = 0
 
-    def put(self, frame: Frame, topic: str | None) -> None:
+    def put(self, frame: bytes, topic: str | None) -> None:
         """Add a frame; of a topic that has its share the oldest goes."""
-        with self._lock:
-            self._bytes += len(frame)
-            if topic is None:
-                self._answers.append(frame)
-                self.is_overfull |= len(self._answers) > _MOST_ANSWERS
-            else:
-                self._messages.append((topic, frame))
-                self._counts[topic] = self._counts.get(topic, 0) + 1
-                if self._counts[topic] > _MOST_OF_A_TOPIC:
-                    index = next(i for i, (name, _) in enumerate(self._messages) if name == topic)
-                    self._drop(index)
-            while self._bytes > self._most_bytes and len(self._messages) > 1:
-                self._drop(0)
-            self.is_overfull |= self._bytes > 4 * self._most_bytes
+        self._bytes += len(frame)
+        if topic is None:
+            self._answers.append(frame)
+            self.is_overfull |= len(self._answers) > _MOST_ANSWERS
+        else:
+            self._messages.append((topic, frame))
+            count = self._counts[topic] = self._counts.get(topic, 0) + 1
+            if count > _MOST_OF_A_TOPIC:
+                self._drop(next(i for i, (name, _) in enumerate(self._messages) if name == topic))
+        while self._bytes > self._most_bytes and len(self._messages) > 1:
+            self._drop(0)
+        self.is_overfull |= self._bytes > 4 * self._most_bytes
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing waits."""
         return not self._answers and not self._messages
 
-    def take(self) -> Frame | None:
-        """Return what is to be sent next, None if there is nothing."""
-        return next(iter(self.take_up_to(1)), None)
-
-    def take_up_to(self, most_bytes: int) -> list[Frame]:
+    def take_up_to(self, most_bytes: int) -> list[bytes]:
         """Return what is to be sent next, frames of so many bytes; the last one may be longer."""
-        frames: list[Frame] = []
-        with self._lock:
-            while most_bytes > 0 and (self._answers or self._messages):
-                if self._answers:
-                    frame = self._answers.popleft()
-                else:
-                    topic, frame = self._messages.popleft()
-                    self._forget(topic)
-                self._bytes -= len(frame)
-                most_bytes -= len(frame)
-                frames.append(frame)
+        if self._bytes <= most_bytes:  # nearly always
+            frames = [*self._answers, *(frame for _, frame in self._messages)]
+            self._answers.clear()
+            self._messages.clear()
+            self._counts.clear()
+            self._bytes = 0
+            return frames
+        frames = []
+        while most_bytes > 0 and not self.is_empty:
+            if self._answers:
+                frame = self._answers.popleft()
+            else:
+                topic, frame = self._messages.popleft()
+                self._forget(topic)
+            self._bytes -= len(frame)
+            most_bytes -= len(frame)
+            frames.append(frame)
         return frames
 
     def _drop(self, index: int) -> None:

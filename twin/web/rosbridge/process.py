@@ -50,6 +50,7 @@ class Rosbridge:
         process.bus.started()
         self.server = Server(config, bridging.limits, process.bus.external.wake)
         self.bridge.topics.urgent = lambda: self.server.stop(self.bridge)
+        self.bridge.topics.together = self.server.together
         self.server.start()
 
     def spin(self, until: Callable[[], bool]) -> None:

@@ -7,7 +7,7 @@ import ssl
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from twin.web.rosbridge.access import ROLES, STOPS, Role, Token, matches
 from twin.web.rosbridge.bridge import Bridge, Limits
 from twin.web.rosbridge.delivery import Delivery, Recipient
 from twin.web.rosbridge.door import Door, given_token, is_loopback, peer_of
-from twin.web.rosbridge.frames import from_json, to_json
+from twin.web.rosbridge.frames import Send, from_json, to_json
 from twin.web.rosbridge.http.answers import Http, response
 from twin.web.rosbridge.outbox import Outbox
 from twin.web.rosbridge.pages import page_of, refusal
@@ -84,8 +84,7 @@ class Connection:
         self.name = name
         self.role = role
         """None until it has told its token."""
-        self.outbox = Outbox(limits.waiting_bytes)
-        self.recipient = Recipient(websocket, self.outbox)
+        self.recipient = Recipient(websocket, Outbox(limits.waiting_bytes))
         self.session: Session | None = None
         self.pending = 0
         self._delivery = delivery
@@ -94,8 +93,7 @@ class Connection:
 
     def send(self, frame: str | bytes, topic: str | None) -> None:
         """Let a frame be sent; called in any thread."""
-        self.outbox.put(frame, topic)
-        self._delivery.wake(self.recipient)
+        self._delivery.post(frame, topic, (self.recipient,))
 
     def refuse(self, why: str) -> None:
         """Tell a client, not more than once a second, that a message of it was dropped."""
@@ -123,6 +121,8 @@ class Server:
         self._events: deque[_Event] = deque()
         self._jobs: deque[Callable[[Bridge], None]] = deque()
         """What clients without a websocket want of the bridge."""
+        self._recipients: dict[Session, Recipient] = {}
+        """Who has joined the bridge."""
         self._door = Door(config, wake)
         self._http = Http(config, limits, self._door, self.ask, lambda: len(self.connections))
         self._ready = threading.Event()
@@ -168,6 +168,12 @@ class Server:
         """Whether `stop` has something to do."""
         return bool(self._stops)
 
+    def together(self, sessions: Sequence[Session]) -> Send:
+        """Return what sends a frame to all of these at once; called in the bridge's thread."""
+        assert self._delivery is not None
+        post, recipients = self._delivery.post, tuple(self._recipients[session] for session in sessions)
+        return lambda frame, topic: post(frame, topic, recipients)
+
     def stop(self, bridge: Bridge) -> None:
         """Do what overtakes all else; called in the bridge's thread, as often as you like."""
         while self._stops:
@@ -177,11 +183,13 @@ class Server:
         connection = event.connection
         if connection.session is None:
             assert connection.role is not None
-            connection.session = bridge.join(
+            session = connection.session = bridge.join(
                 connection.name, connection.role, connection.send, is_known=bool(self._config.tokens)
             )
+            self._recipients[session] = connection.recipient
         if event.message is None:
             connection.session.close()
+            del self._recipients[connection.session]
             return
         connection.pending -= 1
         connection.session.handle(event.message)

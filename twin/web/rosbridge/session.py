@@ -20,7 +20,7 @@ from twin.web.rosbridge.access import (
 )
 from twin.web.rosbridge.control import NAME as CONTROL
 from twin.web.rosbridge.flow import Wanted
-from twin.web.rosbridge.frames import COMPRESSIONS, Fragments, Frame, in_fragments, to_json
+from twin.web.rosbridge.frames import COMPRESSIONS, Fragments, Send, in_fragments, to_json
 
 if TYPE_CHECKING:
     from twin.web.rosbridge.bridge import Bridge
@@ -41,7 +41,7 @@ class Session:
         number: int,
         name: str,
         role: Role,
-        send: Callable[[Frame, str | None], None],
+        send: Send,
         *,
         is_known: bool = False,
     ):
@@ -54,7 +54,6 @@ class Session:
         self._known = name if is_known else ""
         self.role = role
         self.send = send
-        """Takes a frame, and the topic that it is of: of a topic newer ones may take its place."""
         self._bridge = bridge
         self._level = _LEVELS.index("error")
         self._fragments = Fragments(bridge.limits.message_bytes)

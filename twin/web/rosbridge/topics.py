@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from twin.bridge import types
 from twin.bridge.cdr.codec import Codec, codec
@@ -17,8 +17,8 @@ from twin.bridge.topics import Publisher
 from twin.bridge.topics.raw import RawSample, RawSubscription
 from twin.bridge.topics.raw_publisher import Presence
 from twin.errors import BridgeError
-from twin.web.rosbridge.flow import Flow, Wanted, Watch
-from twin.web.rosbridge.frames import Heard
+from twin.web.rosbridge.flow import Crowd, Flow, Wanted, Watch
+from twin.web.rosbridge.frames import Frame, Heard, Send
 from twin.web.rosbridge.history import History
 from twin.web.rosbridge.learner import Learner, type_name
 from twin.web.rosbridge.values import to_message
@@ -49,15 +49,18 @@ class Source:
         learner: Learner,
         now_s: Callable[[], float],
         history: History | None,
-        before: Callable[[], None],
+        topics: Topics,
     ) -> None:
-        self._before = before
+        self._topics = topics
         self._history = history if history is not None and history.has(topic) else None
         self.flows: dict[Hashable, Flow] = {}
         self._graph, self._topic, self._learner, self._now_s = graph, topic, learner, now_s
         self._codecs: dict[tuple[str, str], Codec[Any] | None] = {}
         self._retained: OrderedDict[bytes, deque[Heard]] = OrderedDict()
         self._endpoints: list[Presence | RawSubscription] = []
+        self._crowds: tuple[Crowd, ...] = ()
+        self._others: tuple[Flow, ...] | None = None
+        """Flows that belong to no crowd; None: who is in which is to be found anew."""
         if self._history is not None:
             self._history.hear(topic, self._on_sample)
             return
@@ -72,6 +75,7 @@ class Source:
     def join(self, who: Hashable, flow: Flow) -> None:
         """Let somebody hear the topic, first what was latched."""
         self.flows[who] = flow
+        self._others = None
         if self._history is not None:
             for sample in self._history.state([self._topic]):
                 flow.offer(Heard(sample, self._codec(sample)), self._now_s())
@@ -87,13 +91,32 @@ class Source:
             endpoint.node.destroy_subscription(endpoint)  # type: ignore[arg-type]
 
     def _on_sample(self, sample: RawSample) -> None:
-        self._before()
+        self._topics.urgent()
         heard = Heard(sample, self._codec(sample))
         if self._history is None:
             self._retain(sample, heard)
+        if self._others is None:
+            self._sort()
+        for crowd in self._crowds:
+            crowd.offer(heard)
         now_s = self._now_s()
-        for flow in tuple(self.flows.values()):
+        for flow in self._others or ():
             flow.offer(heard, now_s)
+
+    def sort_anew(self) -> None:
+        """Take note that somebody came, went, or wants the topic in another way."""
+        self._others = None
+
+    def _sort(self) -> None:
+        alike: dict[Any, list[Session]] = {}
+        for who, flow in self.flows.items():
+            if flow.at_once is not None:
+                alike.setdefault(flow.at_once, []).append(cast("Session", who))  # who watches never is
+        self._crowds = tuple(
+            Crowd(self._topic, [self.flows[who] for who in sessions], self._topics.together(sessions))
+            for sessions in alike.values()
+        )
+        self._others = tuple(flow for flow in self.flows.values() if flow.at_once is None)
 
     def _codec(self, sample: RawSample) -> Codec[Any] | None:
         key = sample.type, sample.type_hash
@@ -130,6 +153,16 @@ class _Outlet:
     """When its last owner left."""
 
 
+def one_by_one(sessions: Sequence[Session]) -> Send:
+    """Return what sends a frame to each of these."""
+
+    def send(frame: Frame, topic: str | None) -> None:
+        for session in sessions:
+            session.send(frame, topic)
+
+    return send
+
+
 class Topics:
     """All that clients hear and publish."""
 
@@ -147,6 +180,8 @@ class Topics:
             history.on_jump(self._forget)
         self.urgent: Callable[[], None] = lambda: None
         """Called before each message of the graph: what cannot wait until all that came are passed on."""
+        self.together = one_by_one
+        """Returns what sends a frame to several sessions."""
         self._sources: dict[str, Source] = {}
         self._outlets: dict[str, _Outlet] = {}
         self._late: dict[Flow, None] = {}
@@ -176,6 +211,7 @@ class Topics:
             flow.late = self._late
         flow.want(key, wanted)
         flow.type = expected or flow.type
+        source.sort_anew()
         if is_new:
             source.join(session, flow)
 
@@ -188,6 +224,7 @@ class Topics:
             return
         if flow.unwant(key):
             self.unwatch(session, topic)
+        source.sort_anew()
 
     def watch(
         self,
@@ -220,6 +257,7 @@ class Topics:
         if source is None or flow is None:
             return
         self._late.pop(flow, None)
+        source.sort_anew()
         if not source.flows:
             self._sources.pop(topic).destroy()
 
@@ -233,7 +271,7 @@ class Topics:
                 self._learner,
                 self._now_s,
                 self._history,
-                lambda: self.urgent(),
+                self,
             )
         return self._sources[topic]
 
