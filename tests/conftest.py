@@ -47,5 +47,10 @@ def endpoint() -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run whole scenarios last."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
+    """Run whole scenarios last; of long tests that first which may take longest: nobody waits for it."""
+
+    def order(item: pytest.Item) -> tuple[bool, float]:
+        may_take = item.get_closest_marker("timeout") if item.get_closest_marker("long") else None
+        return item.get_closest_marker("slow") is not None, -may_take.args[0] if may_take else 0.0
+
+    items.sort(key=order)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,50 @@ def test_a_jump_tells_what_was_known_then_and_nothing_later(past: Past) -> None:
     assert not said(back, "/plan")
     assert not said(back, "/rosout")
     assert [m["data"] for m in said(back, "/mission/state")] == [some_bag.MISSION[5]]
+
+
+def past_values(client: Client, **asked: Any) -> dict[str, Any]:
+    asked = {"topic": "/odom", "field": "pose.pose.position.x", "seconds": 2.0, "every": 0.0} | asked
+    return client.tell("call_service", service="/twin/past_values", args=asked)[-1]
+
+
+def test_a_number_is_told_as_it_was_up_to_now(past: Past) -> None:
+    client = past.client("viewer")
+    client.tell("call_service", service="/rosbag2_player/pause")
+    seek(client, 30.0)
+    told = past_values(client)["values"]
+    assert told["times"] == pytest.approx([28.0 + 0.1 * i for i in range(21)])
+    assert told["values"] == pytest.approx([2.8 + 0.01 * i for i in range(21)])
+    assert past_values(client, every=0.45)["values"]["times"] == pytest.approx([28.0, 28.5, 29.0, 29.5, 30.0])
+    assert len(past_values(client, seconds=1e300)["values"]["times"]) == 1, "thinned until it can be told"
+    assert past_values(client, seconds=500.0)["values"]["times"][0] == 0.0
+    assert past_values(client, field="pose.covariance.0")["values"]["values"] == [0.0] * 21
+    for nothing in ("", "pose", "pose.pose.position.w", "pose.covariance.36", "pose..x"):
+        assert past_values(client, field=nothing)["values"]["values"] == [None] * 21
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"topic": "/nowhere"}, "no topic '/nowhere'"),
+        ({"topic": "/twin/history"}, "no topic"),
+        ({"seconds": -1.0}, "are no times"),
+        ({"seconds": None}, "are no times"),
+        ({"every": -1.0}, "are no times"),
+    ],
+)
+def test_what_was_never_told_is_a_sentence(past: Past, asked: dict[str, Any], words: str) -> None:
+    told = past_values(past.client(), **asked)["values"]
+    assert not told["success"]
+    assert words in told["message"]
+
+
+def test_who_may_not_hear_a_topic_may_not_ask_what_it_told(past: Past) -> None:
+    client = past.client()
+    client.session.role = watching(replace(ROLES["viewer"], heard=("/map",)))
+    told = past_values(client)
+    assert told["op"] == "status"
+    assert "/twin/past_values" in told["msg"]
 
 
 @pytest.mark.parametrize("seconds", [-1.0, 61.0, 1e9])

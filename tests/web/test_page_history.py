@@ -125,6 +125,11 @@ def test_the_page_shows_a_bag_as_it_was_and_commands_nothing(address: str) -> No
         page.select_option(".plot >> xpath=../label[2]/select", "twist.twist.linear.x")
         page.hover(".u-over")
         eventually(lambda: "0.1" in page.inner_text(".plot"), "the last value")
+        # And what it was before.
+        page.hover(".u-over", position={"x": 20, "y": 60})
+        when, what = page.locator(".u-legend .u-value").all_inner_texts()
+        assert 10.0 < float(when.replace(",", "")) < 30.0, "half a minute ago"
+        assert what == "0.1"
         page.click("#language")
         eventually(lambda: "字段" in page.inner_text(".u-legend"), "the legend is in the page's language")
         page.click("#language")

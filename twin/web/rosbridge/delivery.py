@@ -60,7 +60,7 @@ class Delivery:
         self._is_called = False
         reached: dict[Recipient, None] = {}
         last, packed = None, b""
-        while self._posted:
+        for _ in range(len(self._posted)):
             frame, topic, recipients = self._posted.popleft()
             if frame is not last:  # one that goes out in different ways is posted several times in a row
                 last, packed = frame, _packed(frame)

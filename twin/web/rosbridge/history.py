@@ -18,11 +18,13 @@ from twin.bridge.topics.raw import RawSample
 from twin.bridge.topics.raw_publisher import Presence
 from twin.bridge.types import ServiceType
 from twin.bridge.wire.keys import Attachment
-from twin.errors import BridgeError, RecordingError
-from twin.web.rosbridge.access import ROLES, Role
+from twin.errors import BridgeError, RecordingError, TwinError
+from twin.web.rosbridge.access import EVERYTHING, ROLES, Role
+from twin.web.rosbridge.past_values import past_values
 
 NAME = "/twin/history"
 """Of the topic that tells where the bag stands."""
+_PAST = "/twin/past_values"
 _PLAYER = "/rosbag2_player"
 _NS = 1_000_000_000
 _TOLD_S = 0.25
@@ -41,7 +43,8 @@ def watching(role: Role) -> Role:
     viewer = ROLES["viewer"]
     return Role(
         role.name,
-        services=(*viewer.services, f"{_PLAYER}/*"),
+        # That service does not know who asks: it is for those who may hear every topic.
+        services=(*viewer.services, f"{_PLAYER}/*", *((_PAST,) if role.heard == EVERYTHING else ())),
         not_services=viewer.not_services,
         heard=role.heard,
     )
@@ -237,6 +240,18 @@ class History:
         for name, (kind, answer) in zip(names, answers.items(), strict=True):
             service = ServiceType(f"rosbag2_interfaces/srv/{kind}")
             self._node.create_service(service, f"~/{name}", _responding(service, answer))
+        service = ServiceType("twin_msgs/srv/PastValues")
+        self._node.create_service(service, _PAST, _responding(service, self._past_values))
+
+    def _past_values(self, request: Any) -> dict[str, Any]:
+        if request.topic == NAME or request.topic not in self._topics:
+            return {"message": f"the bag has no topic {request.topic[:80]!r}"}
+        asked = request.topic, self._topics[request.topic].type, request.field, request.seconds, request.every
+        try:
+            times, values = past_values(self._bag, *asked, self._said_ns)
+        except TwinError as error:
+            return {"message": str(error)}
+        return {"success": True, "times": times, "values": values}
 
 
 def _responding(service: ServiceType, answer: Callable[[Any], dict[str, Any] | None]) -> Callable[[Any], Any]:

@@ -5,6 +5,7 @@ import uPlot from "uplot";
 
 const HEIGHT = 240; // px
 const WINDOW = 600; // samples
+const EVERY_S = 0.05; // between two samples, at least
 const ELEMENTS = 12; // of an array, that are offered
 
 /** Return the paths of numbers in a message. */
@@ -26,7 +27,17 @@ export function Plot({ station, t, theme }) {
   const box = useRef(), chart = useRef(), last = useRef(), samples = useRef([[], []]), chosen = useRef("");
   const jumps = station.history?.jumps;
   chosen.current = field;
-  const restart = () => chart.current?.setData((samples.current = [[], []]));
+  const restart = () => {
+    const begun = (samples.current = [[], []]);
+    chart.current?.setData(begun);
+    if (!station.history || !field) return;
+    const asked = { topic, field, seconds: WINDOW * EVERY_S, every: EVERY_S };
+    station.ros.call("/twin/past_values", "twin_msgs/srv/PastValues", asked).then(({ times, values }) => {
+      if (samples.current !== begun) return; // something else was chosen meanwhile
+      const before = times.filter((time) => !(time >= begun[0][0]));
+      chart.current?.setData((samples.current = [[...before, ...begun[0]], [...values.slice(0, before.length), ...begun[1]]]));
+    }).catch(() => {}); // who may not ask sees what comes from now on
+  };
   const draw = () => {
     if (!chosen.current || !last.current) return;
     const [x, y] = samples.current, now = timeOf(station.clock);
@@ -58,7 +69,7 @@ export function Plot({ station, t, theme }) {
       known = true;
       last.current = message;
       draw();
-    }, 50);
+    }, 1000 * EVERY_S);
   }, [topic]);
   useEffect(restart, [topic, field, jumps]); // what was at another time in the bag is over
   useEffect(draw, [field]); // a bag that is paused says no more
