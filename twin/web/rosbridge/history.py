@@ -24,7 +24,8 @@ from twin.web.rosbridge.past_values import past_values
 
 NAME = "/twin/history"
 """Of the topic that tells where the bag stands."""
-_PAST = "/twin/past_values"
+PAST = "/twin/past_values"
+"""Of the service that tells what numbers were before."""
 _PLAYER = "/rosbag2_player"
 _NS = 1_000_000_000
 _TOLD_S = 0.25
@@ -44,7 +45,7 @@ def watching(role: Role) -> Role:
     return Role(
         role.name,
         # That service does not know who asks: it is for those who may hear every topic.
-        services=(*viewer.services, f"{_PLAYER}/*", *((_PAST,) if role.heard == EVERYTHING else ())),
+        services=(*viewer.services, f"{_PLAYER}/*", *((PAST,) if role.heard == EVERYTHING else ())),
         not_services=viewer.not_services,
         heard=role.heard,
     )
@@ -241,7 +242,7 @@ class History:
             service = ServiceType(f"rosbag2_interfaces/srv/{kind}")
             self._node.create_service(service, f"~/{name}", _responding(service, answer))
         service = ServiceType("twin_msgs/srv/PastValues")
-        self._node.create_service(service, _PAST, _responding(service, self._past_values))
+        self._node.create_service(service, PAST, _responding(service, self._past_values))
 
     def _past_values(self, request: Any) -> dict[str, Any]:
         if request.topic == NAME or request.topic not in self._topics:
