@@ -90,6 +90,16 @@ def test_who_comes_goes_and_asks_anew_hears_what_is_meant_for_it(world: World) -
     assert say("c") == [["c"], ["c"], []], "it comes too early for the third"
     third.tell("subscribe", topic="/chatter")
     assert say("d") == [["d"], ["d"], ["d"]], "its second subscription wants all"
+    third.tell("subscribe", topic="/chatter", throttle_rate=100_000)
+    assert say("-") == [["-"], ["-"], []], "now it does not"
+    third.tell("subscribe", topic="/chatter", id="all")
+    assert say("+") == [["+"], ["+"], ["+"]]
+    third.tell("unsubscribe", topic="/chatter", id="all")
+    assert say("-") == [["-"], ["-"], []], "what it wants without an id is left"
+    third.tell("subscribe", topic="/chatter")
+    second.tell("subscribe", topic="/chatter", id="one", throttle_rate=100_000)
+    assert [say("x"), say("y")] == [[["x"], ["x"], ["x"]], [["y"], [], ["y"]]]
+    second.tell("subscribe", topic="/chatter", id="one")
     first.tell("unsubscribe", topic="/chatter", id="one")
     assert say("e") == [[], ["e"], ["e"]]
     second.session.close()
@@ -110,6 +120,8 @@ def test_all_who_expect_another_type_are_told_once(world: World) -> None:
     clients = [world.client() for _ in range(2)]
     for client in clients:
         client.tell("subscribe", topic="/chatter", type=TWIST)
+    other = world.client()
+    other.tell("subscribe", topic="/chatter")
     publisher = world.bus.create_node("talker").create_publisher(String, "/chatter")
     for text in "ab":
         publisher.publish(String(text))
@@ -117,6 +129,20 @@ def test_all_who_expect_another_type_are_told_once(world: World) -> None:
     for client in clients:
         (told,) = errors(client.heard())
         assert "has the type std_msgs/msg/String, not geometry_msgs/msg/Twist" in told
+    assert [each["msg"]["data"] for each in other.heard()] == ["a", "b"]
+
+
+def test_who_watches_no_more_hears_no_more(world: World) -> None:
+    client, heard = world.client(), []
+    client.tell("subscribe", topic="/chatter", type="std_msgs/String")
+    world.bridge.topics.watch("picture", "/chatter", lambda each: heard.append(each.message.data))
+    publisher = world.bus.create_node("talker").create_publisher(String, "/chatter")
+    for text in "ab":
+        publisher.publish(String(text))
+        world.spin()
+        world.bridge.topics.unwatch("picture", "/chatter")
+    assert heard == ["a"]
+    assert len(client.heard()) == 2
 
 
 def test_throttle_and_queue(world: World) -> None:

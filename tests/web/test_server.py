@@ -330,6 +330,7 @@ def test_what_goes_to_several_clients_comes_to_each_in_order() -> None:
         heard = [numbers(client, 10) for client in clients]
         clients.pop().close()
         heard = [each + numbers(client, 20) for each, client in zip(heard, clients, strict=False)]
+        wait_for(lambda: len(rosbridge.server.recipients) == 3)
     assert heard == [[str(number) for number in range(30)]] * 3
 
 
@@ -441,6 +442,12 @@ def test_newer_messages_win(at_once: int) -> None:
     outbox.put(b"x" * 900, "/a")
     outbox.put(b"y" * 900, "/b")
     assert taken() == [b"y" * 900]
+    dropped = outbox.dropped
+    for _ in range(10):
+        outbox.put(b"x" * 200, "/a")
+        outbox.put(b"y" * 200, "/b")
+        assert len(taken()) == 2
+    assert outbox.dropped == dropped, "what was taken waits no more"
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")

@@ -114,6 +114,8 @@ class Server:
 
     def __init__(self, config: ServerConfig, limits: Limits, wake: Callable[[], None]) -> None:
         self.connections: set[Connection] = set()
+        self.recipients: dict[Session, Recipient] = {}
+        """Who has joined the bridge."""
         self.address = ""
         """Such as ws://127.0.0.1:9090."""
         self._config, self._limits, self._wake = config, limits, wake
@@ -121,8 +123,6 @@ class Server:
         self._events: deque[_Event] = deque()
         self._jobs: deque[Callable[[Bridge], None]] = deque()
         """What clients without a websocket want of the bridge."""
-        self._recipients: dict[Session, Recipient] = {}
-        """Who has joined the bridge."""
         self._door = Door(config, wake)
         self._http = Http(config, limits, self._door, self.ask, lambda: len(self.connections))
         self._ready = threading.Event()
@@ -171,7 +171,7 @@ class Server:
     def together(self, sessions: Sequence[Session]) -> Send:
         """Return what sends a frame to all of these at once; called in the bridge's thread."""
         assert self._delivery is not None
-        post, recipients = self._delivery.post, tuple(self._recipients[session] for session in sessions)
+        post, recipients = self._delivery.post, tuple(self.recipients[session] for session in sessions)
         return lambda frame, topic: post(frame, topic, recipients)
 
     def stop(self, bridge: Bridge) -> None:
@@ -186,10 +186,10 @@ class Server:
             session = connection.session = bridge.join(
                 connection.name, connection.role, connection.send, is_known=bool(self._config.tokens)
             )
-            self._recipients[session] = connection.recipient
+            self.recipients[session] = connection.recipient
         if event.message is None:
             connection.session.close()
-            del self._recipients[connection.session]
+            del self.recipients[connection.session]
             return
         connection.pending -= 1
         connection.session.handle(event.message)

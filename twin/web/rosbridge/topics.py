@@ -224,7 +224,8 @@ class Topics:
             return
         if flow.unwant(key):
             self.unwatch(session, topic)
-        source.sort_anew()
+        else:
+            source.sort_anew()
 
     def watch(
         self,
