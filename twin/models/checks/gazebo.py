@@ -8,6 +8,7 @@ from twin.errors import nearest
 from twin.models.checks.diagnostic import Diagnostic, finding, finding_in, read_source
 from twin.models.description import RobotDescription
 from twin.models.sensors import SENSORS, plugin_of
+from twin.models.urdf.batteries import is_battery
 from twin.models.urdf.cameras import CAMERA, lenses
 from twin.models.urdf.commands import HARDWARE, INTERFACES, command_interface, transmissions
 from twin.models.urdf.document import Element, Report, first
@@ -68,7 +69,9 @@ def _unknown_reference(element: Element, name: str, description: RobotDescriptio
 
 def _plugin(plugin: Element) -> Iterator[Found]:
     library, name = library_of(plugin), plugin.get("name", "")
-    if is_drive(plugin) or library == PLUGIN_IMU or library.endswith((*OWN_PLUGINS, *WORLD_PLUGINS)):
+    if is_drive(plugin) or is_battery(plugin) or library == PLUGIN_IMU:
+        return
+    if library.endswith((*OWN_PLUGINS, *WORLD_PLUGINS)):
         return
     what = name.rpartition("::")[2] if "::" in name else (library or name)
     fix = "drives are DiffDrive and skid steer; give joints a <command_interface>, followers a <mimic>"
