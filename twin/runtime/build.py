@@ -225,7 +225,8 @@ def _battery(scenario: Scenario, index: int, description: RobotDescription) -> B
     try:
         return battery_config(description.battery, given)
     except ScenarioError as wrong:
-        raise ScenarioError(scenario.source.problem(("robots", index, "battery"), str(wrong))) from None
+        message = f"battery of robot '{scenario.robots[index].id}': {wrong}"
+        raise ScenarioError(scenario.source.problem(("robots", index, "battery"), message)) from None
 
 
 def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:

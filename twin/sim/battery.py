@@ -12,18 +12,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated
 
-from twin.parameters import (
-    Coulombs,
-    Hertz,
-    Interval,
-    Metres,
-    NotNegative,
-    Ohms,
-    Positive,
-    Seconds,
-    Volts,
-    Watts,
-)
+from twin.parameters import Coulombs, Hertz, Interval, Metres, NotNegative, Ohms, Seconds, Volts, Watts
+
+_LEAST = 0.1
+"""Open-circuit voltage of any battery [V], empty ones too: nothing is divided by less."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,41 +24,41 @@ class BatteryConfig:
 
     battery_name: str = "battery"
     """What `battery_state` tells as its location."""
-    voltage: Annotated[Volts, Positive] = 24.0
+    voltage: Annotated[Volts, Interval(ge=0.1, le=1e4)] = 24.0
     """At the start, before any current flows."""
-    open_circuit_voltage_constant_coef: Annotated[Volts, Positive] = 26.0
+    open_circuit_voltage_constant_coef: Annotated[Volts, Interval(ge=0.1, le=1e4)] = 26.0
     """Without load when it is full."""
-    open_circuit_voltage_linear_coef: Volts = -4.0
+    open_circuit_voltage_linear_coef: Annotated[Volts, Interval(ge=-1e4, le=1e4)] = -4.0
     """By how much more when it is empty; usually negative."""
-    capacity: Annotated[Coulombs, Positive] = 72_000.0
+    capacity: Annotated[Coulombs, Interval(ge=3.6, le=3.6e9)] = 72_000.0
     """Charge when it is full, such as `20 Ah`."""
     initial_charge: Annotated[Coulombs, NotNegative] | None = None
     """Charge at the start, such as `5 Ah`; absent: full."""
-    resistance: Annotated[Ohms, NotNegative] = 0.05
+    resistance: Annotated[Ohms, Interval(ge=0.0, le=1e6)] = 0.05
     """Its inner one."""
-    smooth_current_tau: Annotated[Seconds, Positive] = 1.0
+    smooth_current_tau: Annotated[Seconds, Interval(gt=0.0, le=1e5)] = 1.0
     """Time constant with which the current follows the load."""
-    power_load: Annotated[Watts, NotNegative] = 20.0
+    power_load: Annotated[Watts, Interval(ge=0.0, le=1e9)] = 20.0
     """Of computers and sensors, all the time; what motors really do comes on top."""
     enable_recharge: bool = True
     """Whether chargers charge it."""
-    charging_time: Annotated[Seconds, Positive] = 7200.0
+    charging_time: Annotated[Seconds, Interval(ge=3.6, le=3.6e8)] = 7200.0
     """In which a charger fills an empty battery that has no load."""
     start_draining: bool = True
     """Whether it drains from the start, else from the first command to a motor."""
-    charger_reach: Annotated[Metres, Positive] = 0.1
+    charger_reach: Annotated[Metres, Interval(gt=0.0, le=10.0)] = 0.1
     """How far from the pose of a dock that is a charger the base may stand."""
     update_rate: Annotated[Hertz, Interval(ge=0.001, le=1000.0)] = 1.0
     """Of `battery_state`; no more than one a control period."""
 
     def __post_init__(self) -> None:
         if self.initial_charge is not None and self.initial_charge > self.capacity:
-            least, most = self.initial_charge / 3600.0, self.capacity / 3600.0
-            raise ValueError(f"initial_charge must be at most the capacity, {most:g} Ah, not {least:g} Ah")
+            most, given = self.capacity / 3600.0, self.initial_charge / 3600.0
+            raise ValueError(f"initial_charge must be at most the capacity, {most:g} Ah, not {given:g} Ah")
         empty = self.open_circuit_voltage_constant_coef + self.open_circuit_voltage_linear_coef
-        if empty <= 0.0:
+        if empty < _LEAST:
             raise ValueError(
-                "open_circuit_voltage_linear_coef must leave the empty battery a positive voltage, not "
+                f"open_circuit_voltage_linear_coef must leave an empty battery {_LEAST:g} V or more, not "
                 f"{empty:g} V"
             )
 

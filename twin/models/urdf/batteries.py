@@ -5,7 +5,8 @@ Element names and units: gz-sim's LinearBatteryPlugin system; charges are in Ah 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 from twin.models.specs import BatterySpec
 from twin.models.urdf.document import Element, Report, text_of
@@ -16,11 +17,22 @@ LIBRARIES = ("gz-sim-linearbattery-plugin-system", "ignition-gazebo-linearbatter
 CLASSES = ("::systems::LinearBattery", "::systems::LinearBatteryPlugin")
 HOUR = 3600.0
 """[s]; and an Ah in [C]"""
-POSITIVE = ("voltage", "capacity", "smooth_current_tau", "charging_time")
-NOT_NEGATIVE = ("initial_charge", "resistance", "power_load")
-SIGNED = ("open_circuit_voltage_constant_coef", "open_circuit_voltage_linear_coef")
+RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {
+        "voltage": (0.1, 1e4),
+        "open_circuit_voltage_constant_coef": (0.1, 1e4),
+        "open_circuit_voltage_linear_coef": (-1e4, 1e4),
+        "capacity": (0.001, 1e6),
+        "initial_charge": (0.0, 1e6),
+        "resistance": (0.0, 1e6),
+        "smooth_current_tau": (1e-9, 1e5),
+        "power_load": (0.0, 1e9),
+        "charging_time": (0.001, 1e5),
+    }
+)
+"""Numbers that have an effect, with the least and the largest, in the file's units."""
 FLAGS = ("enable_recharge", "start_draining")
-ELEMENTS = ("battery_name", *POSITIVE, *NOT_NEGATIVE, *SIGNED, *FLAGS)
+ELEMENTS = ("battery_name", *RANGES, *FLAGS)
 """What has an effect. Charge is always counted as with `fix_issue_225`."""
 
 
@@ -30,24 +42,25 @@ def read_battery(root: Element, report: Report) -> BatterySpec | None:
     if plugin is None:
         return None
     known = len(report.problems)
-    values = {name: _number(plugin, name, report) for name in (*POSITIVE, *NOT_NEGATIVE, *SIGNED)}
+    values = {name: _number(plugin, name, report) for name in RANGES}
     flags = {name: _flag(plugin, name, report) for name in FLAGS}
     needed = ["voltage", "capacity", *(["charging_time"] if flags["enable_recharge"] else [])]
     for name in needed:
         if plugin.find(name) is None:
-            _wrong(plugin, f"needs a positive <{name}>", report)
+            _wrong(plugin, f"needs <{name}>", report)
     if len(report.problems) > known:
         return None
     voltage, capacity = values["voltage"] or 0.0, values["capacity"] or 0.0
     charge, hours = values["initial_charge"], values["charging_time"]
-    constant, linear = (values[name] for name in SIGNED)
+    constant = values["open_circuit_voltage_constant_coef"]
+    linear = values["open_circuit_voltage_linear_coef"]
     if charge is not None and charge > capacity:
         message = f"has initial_charge {charge:g} Ah; valid: 0 to its capacity, {capacity:g} Ah"
         _wrong(plugin.find("initial_charge"), message, report)
-    full = voltage if constant is None else constant
-    if (least := min(full, full + (linear or 0.0))) <= 0.0:
+    empty = (voltage if constant is None else constant) + (linear or 0.0)
+    if empty < RANGES["voltage"][0]:
         _wrong(
-            plugin, f"has an open-circuit voltage of {least:g} V, full or empty; give a positive one", report
+            plugin, f"leaves an empty battery {empty:g} V; valid: {RANGES['voltage'][0]:g} V or more", report
         )
     return BatterySpec(
         battery_name=text_of(plugin, "battery_name") or "battery",
@@ -78,11 +91,9 @@ def is_battery(plugin: Element) -> bool:
 
 def _number(plugin: Element, name: str, report: Report) -> float | None:
     value = report.child_number(plugin, name)
-    if value is None or name in SIGNED:
-        return value
-    if value < 0.0 or (value == 0.0 and name in POSITIVE):
-        valid = "more than 0" if name in POSITIVE else "0 or more"
-        _wrong(plugin.find(name), f"has {name} {value:g}; valid: {valid}", report)
+    low, high = RANGES[name]
+    if value is not None and not low <= value <= high:
+        _wrong(plugin.find(name), f"has {name} {value:g}; valid: {low:g} to {high:g}", report)
     return value
 
 
