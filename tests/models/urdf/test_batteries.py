@@ -59,6 +59,11 @@ def test_every_spelling(kind: str) -> None:
     assert (few.battery_name, few.enable_recharge, few.power_load) == ("battery", False, None)
 
 
+def test_a_whole_plugin_is_no_news_to_check() -> None:
+    description = parse_urdf(robot(GIVEN), Path("r.urdf"))
+    assert "not-simulated" not in [found.code for found in check(description)]
+
+
 def test_no_other_plugin_is_a_battery() -> None:
     assert parse_urdf(robot("", "filename='libwind.so' name='wind'"), Path("r.urdf")).battery is None
 
@@ -88,7 +93,10 @@ def test_report_and_check_know_it(tmp_path: Path) -> None:
     more = f"<plugin {NEW}><voltage>1</voltage><capacity>1</capacity></plugin>"
     file.write_text(robot(GIVEN + "<soc_threshold>0.5</soc_threshold>", more=more), encoding="utf-8")
     description = load(file)
-    assert "not-simulated" not in [found.code for found in check(description)]
+    assert [found.message for found in check(description) if found.code == "not-simulated"] == [
+        "<soc_threshold> of the battery plugin has no effect",
+        "another battery plugin stands before; the first counts",
+    ]
     report = export(description, tmp_path / "out")
     assert json.loads((tmp_path / "out/report.json").read_text("utf-8")) == json.loads(json.dumps(report))
     assert report["battery"]["capacity"] == pytest.approx(4320.0)

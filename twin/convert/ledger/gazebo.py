@@ -11,7 +11,7 @@ from twin.models.kinematics import ONE_DOF
 from twin.models.sensors import SENSORS, plugin_of
 from twin.models.specs import CameraSpec, SensorSpec
 from twin.models.urdf.batteries import ELEMENTS as OF_BATTERIES
-from twin.models.urdf.batteries import batteries, is_battery
+from twin.models.urdf.batteries import IN_ANY_CASE, batteries, is_battery
 from twin.models.urdf.cameras import CAMERA
 from twin.models.urdf.document import Element
 from twin.models.urdf.drives import CONTROLLER, LEFT, RIGHT, TORQUES, is_drive, library_of
@@ -176,6 +176,8 @@ def _battery(element: Element, plugin: Element) -> Fate:
         return "dropped", "the first battery of the robot counts"
     if element is plugin:
         return "dropped", "MuJoCo has no batteries; twin run drains it, and publishes battery_state"
+    if element.tag in IN_ANY_CASE:
+        return "dropped", "charge is counted like that in any case"
     if element.tag not in OF_BATTERIES:
         return "dropped", "the plugin's own business"
     if plugin.find(element.tag) is not element:

@@ -33,7 +33,9 @@ RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
 """Numbers that have an effect, with the least and the largest, in the file's units."""
 FLAGS = ("enable_recharge", "start_draining")
 ELEMENTS = ("battery_name", *RANGES, *FLAGS)
-"""What has an effect. Charge is always counted as with `fix_issue_225`."""
+"""What has an effect, and what does not is told by `twin check`."""
+IN_ANY_CASE = ("fix_issue_225",)
+"""What asks for what is done anyway."""
 
 
 def read_battery(root: Element, report: Report) -> BatterySpec | None:
