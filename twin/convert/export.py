@@ -85,6 +85,8 @@ def export(
             message = f"the model differs from the file, as its numbers are beyond MuJoCo's: {checked}"
             raise ConversionError(Problem(message, description.source, code="mujoco", element="robot"))
         report = _report(description, conversion, model, assets, checked) | {"sensors": sensors}
+        if description.battery is not None:
+            report["battery"] = asdict(description.battery)
         if drive_check is not None and conversion.root_joint is not None:
             report["self_check"]["drive"] = drive_check(description)
         text = json.dumps(report, indent=2, ensure_ascii=False) + "\n"

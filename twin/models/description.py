@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from twin.errors import ModelError, Problem, nearest
 from twin.geometry import Array, Pose3
 from twin.models.shapes import Collision, Shape, SkippedMesh, Visual
-from twin.models.specs import CameraSpec, CommandSpec, DriveSpec, Interface, SensorSpec
+from twin.models.specs import BatterySpec, CameraSpec, CommandSpec, DriveSpec, Interface, SensorSpec
 from twin.models.urdf.line_table import LineTable
 
 if TYPE_CHECKING:
@@ -137,6 +137,7 @@ class RobotDescription:
     root: str
     """The link without a parent."""
     drive: DriveSpec | None = None
+    battery: BatterySpec | None = None
     commands: Mapping[str, CommandSpec] = field(default_factory=dict)
     """By joint."""
     states: Mapping[str, tuple[Interface, ...]] = field(default_factory=dict)

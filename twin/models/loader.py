@@ -12,6 +12,7 @@ from twin.models.expansion.expand import expand
 from twin.models.kinematics import rigid_groups
 from twin.models.mass_properties import describe_repair
 from twin.models.options import DEFAULTS, ReadOptions
+from twin.models.urdf.batteries import read_battery
 from twin.models.urdf.cameras import read_cameras
 from twin.models.urdf.commands import read_commands, read_states, read_transmissions
 from twin.models.urdf.document import Element, Report, parse
@@ -119,6 +120,7 @@ def parse_urdf(
         joints=joints,
         root=root_link,
         drive=read_drive(root, joints, report),
+        battery=read_battery(root, report),
         commands=read_transmissions(root, joints, report, read_commands(root, joints, report)),
         states=read_states(root, joints),
         sensors=(sensors := read_sensors(root, links, report, options)),

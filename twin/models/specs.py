@@ -51,6 +51,34 @@ class DriveSpec:
 
 
 @dataclass(frozen=True, kw_only=True)
+class BatterySpec:
+    """A battery, from the LinearBattery plugin in `<gazebo>`; what None is, the file does not say."""
+
+    battery_name: str
+    voltage: float
+    """[V]"""
+    capacity: float
+    """[C]; the file has Ah"""
+    initial_charge: float | None = None
+    """[C]; the file has Ah"""
+    open_circuit_voltage_constant_coef: float | None = None
+    """[V]"""
+    open_circuit_voltage_linear_coef: float | None = None
+    """[V]"""
+    resistance: float | None = None
+    """[Ω]"""
+    smooth_current_tau: float | None = None
+    """[s]"""
+    power_load: float | None = None
+    """[W]"""
+    enable_recharge: bool = False
+    charging_time: float | None = None
+    """[s]; the file has hours"""
+    start_draining: bool | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
 class CommandSpec:
     """How a joint is commanded, from `<ros2_control>` or `<transmission>` (wheels of a drive need none)."""
 

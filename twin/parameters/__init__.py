@@ -53,6 +53,7 @@ from twin.parameters.forms import PeriodNs as PeriodNs
 from twin.parameters.forms import ReadOnly as ReadOnly
 from twin.parameters.forms import Underscored as Underscored
 from twin.parameters.units import Amperes as Amperes
+from twin.parameters.units import Coulombs as Coulombs
 from twin.parameters.units import Hertz as Hertz
 from twin.parameters.units import Joules as Joules
 from twin.parameters.units import Kilograms as Kilograms
@@ -61,6 +62,7 @@ from twin.parameters.units import MetresPerSecond as MetresPerSecond
 from twin.parameters.units import MetresPerSecondCubed as MetresPerSecondCubed
 from twin.parameters.units import MetresPerSecondSquared as MetresPerSecondSquared
 from twin.parameters.units import Newtons as Newtons
+from twin.parameters.units import Ohms as Ohms
 from twin.parameters.units import PerMetre as PerMetre
 from twin.parameters.units import Radians as Radians
 from twin.parameters.units import RadiansPerSecond as RadiansPerSecond
@@ -70,3 +72,5 @@ from twin.parameters.units import Share as Share
 from twin.parameters.units import SquareMetres as SquareMetres
 from twin.parameters.units import SquareRadians as SquareRadians
 from twin.parameters.units import Unit as Unit
+from twin.parameters.units import Volts as Volts
+from twin.parameters.units import Watts as Watts

@@ -96,6 +96,10 @@ SquareMetres = Annotated[
 ]
 SquareRadians = Annotated[float, Unit("squared angle", (("rad²", "1"), ("rad^2", "1")))]
 Amperes = Annotated[float, Unit("current", (("A", "1"), ("mA", "1/1000")))]
+Volts = Annotated[float, Unit("voltage", (("V", "1"), ("mV", "1/1000")))]
+Ohms = Annotated[float, Unit("resistance", (("Ω", "1"), ("ohm", "1"), ("mΩ", "1/1000"), ("mohm", "1/1000")))]
+Watts = Annotated[float, Unit("power", (("W", "1"), ("mW", "1/1000"), ("kW", "1000")))]
+Coulombs = Annotated[float, Unit("charge", (("C", "1"), ("Ah", "3600"), ("mAh", "18/5")))]
 Share = Annotated[float, Unit("share", (("1", "1"), ("%", "1/100"), ("ppm", "1/1000000")))]
 
 

@@ -50,7 +50,9 @@ from twin.sim.scene import Decal, FreeBody, PlacedBody, Scene, Shape, StaticBody
 from twin.sim.world import World
 
 if TYPE_CHECKING:
+    from twin.models.description import RobotDescription
     from twin.navigation.maps.occupancy_map import OccupancyMap
+    from twin.sim.battery import BatteryConfig
     from twin.warehouse.arena import Arena
     from twin.warehouse.shelf import Zone as ArenaZone
 
@@ -115,11 +117,12 @@ def build(
     starts = {robot.id: _start(robot, arena) for robot in scenario.robots}
     timestep = scenario.physics.timestep
     reading = ReadOptions(sensors=tuple(map(SENSORS.find, scenario.sensors)), execute=True)
-    placements, heights, ratios = [], {}, {}
-    for robot in scenario.robots:
+    placements, heights, ratios, batteries = [], {}, {}, {}
+    for i, robot in enumerate(scenario.robots):
         described = load(robot.model, replace(reading, args=robot.args))
         description = with_drive(described, robot, scenario.tasks)
         conversion = convert(description, base=robot.base, timestep=timestep)
+        batteries[robot.id] = _battery(scenario, i, description)
         heights[robot.id] = conversion.spawn_height
         ratios[robot.id] = calibrated_track_ratio(conversion, timestep=timestep)
         placements.append(
@@ -167,6 +170,7 @@ def build(
                     track_ratio=ratios[robot.id],
                     namespace=_namespace(scenario, robot, layout),
                     layout=layout,
+                    battery=batteries[robot.id],
                 )
             )
             for robot in scenario.robots
@@ -209,6 +213,20 @@ def _options(scenario: Scenario, layout: Layout) -> NodeOptions | None:
             RemapRule(f"{space}/cmd_vel", f"{layout.hardware}{space}/{layout.commands}") for space in spaces
         ]
     return NodeOptions(arguments=RosArguments(remappings=(*_TREE_EACH, *rules)))
+
+
+def _battery(scenario: Scenario, index: int, description: RobotDescription) -> BatteryConfig | None:
+    """Return the battery of a robot, if its file or the scenario speaks of one."""
+    given = scenario.robots[index].battery
+    if given is None and description.battery is None:
+        return None
+    from twin.runtime.defaults.battery import battery_config
+
+    try:
+        return battery_config(description.battery, given)
+    except ScenarioError as wrong:
+        message = f"battery of robot '{scenario.robots[index].id}': {wrong}"
+        raise ScenarioError(scenario.source.problem(("robots", index, "battery"), message)) from None
 
 
 def _start(robot: RobotConfig, arena: Arena | None) -> Pose2:

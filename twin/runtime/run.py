@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from twin.bridge.msgs import Clock as ClockMsg
@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from twin.bridge.topics import Publisher
     from twin.faults.schedule import FaultSchedule
     from twin.recording.sink import RerunSink
+    from twin.runtime.on_board_battery import OnBoardBattery
     from twin.runtime.outside import Lockstep
     from twin.runtime.sensing import Due
+    from twin.runtime.stacks.robot import RobotStack
     from twin.runtime.workers.workers import Workers
+    from twin.sim.world import World
 
 _OBSERVED_TICKS = 5
 """Checks see one observation in so many control ticks; the contacts of the others are in it."""
@@ -59,6 +62,8 @@ class Run:
             from twin.runtime.topics import watch_topics
 
             watch_topics(self.bus, self.checks)
+        self.batteries = _batteries(self.world, parts.stacks)
+        """By robot."""
         self._sink = sink
         stacks = parts.stacks.values()
         due: list[Due] = [
@@ -199,6 +204,8 @@ class Run:
         self.wait()
         self.parts.clock.now_ns = self.world.time_ns
         self.schedule.fire(self.world.step_count)
+        for battery in self.batteries.values():
+            battery.update()
 
     def clock(self) -> None:
         """6. `/clock`."""
@@ -230,3 +237,28 @@ class Run:
         if self.parts.mission.done and self._mission_end_ns is None and not self._endless:
             self._mission_end_ns = now
             self._end_ns = min(self._end_ns, now + _SETTLE_NS)
+
+
+def _batteries(world: World, stacks: Mapping[str, RobotStack]) -> dict[str, OnBoardBattery]:
+    """Return the batteries of the robots that have one; docks of any robot are in the way of all."""
+    found: dict[str, OnBoardBattery] = {}
+    for name, stack in stacks.items():
+        config, node = stack.context.battery, stack.battery
+        if config is None or node is None:
+            continue
+        from twin.runtime.on_board_battery import OnBoardBattery, charger_poses
+
+        found[name] = OnBoardBattery(
+            world,
+            stack.handle,
+            node,
+            config,
+            base=stack.frames.base,
+            chargers=lambda: [
+                pose
+                for each in stacks.values()
+                if each.docks is not None
+                for pose in charger_poses(each.docks, each.frames.map)
+            ],
+        )
+    return found

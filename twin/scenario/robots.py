@@ -15,12 +15,14 @@ from twin.strict_yaml.later import later
 
 if TYPE_CHECKING:
     from twin.scenario.apriltag import AprilTagParameters
+    from twin.scenario.battery import BatteryParameters
     from twin.scenario.estimators.lidar_odometry import LidarOdometryParameters
     from twin.scenario.navigation import NavigationConfig
     from twin.scenario.picture_detectors import PictureDetectorEntry
 else:  # most robots of small scenarios have none, and it is as much as all the rest
     NavigationConfig = later("twin.scenario.navigation:NavigationConfig")
     AprilTagParameters = later("twin.scenario.apriltag:AprilTagParameters")
+    BatteryParameters = later("twin.scenario.battery:BatteryParameters")
     LidarOdometryParameters = later("twin.scenario.estimators.lidar_odometry:LidarOdometryParameters")
     PictureDetectorEntry = later("twin.scenario.picture_detectors:PictureDetectorEntry")
 
@@ -44,6 +46,9 @@ class RobotConfig(StrictModel):
     """Between a command to its motors and their start [s]; a whole number of control periods."""
     emergency_deceleration: Annotated[MetresPerSecondSquared, Positive] = 3.0
     """Of its base, when its [emergency stop](guard.md#in-a-run) is pressed."""
+    battery: BatteryParameters | None = None
+    """What [powers](robots.md#batteries) it; absent: what its file says, else nothing that could run out,
+    `{}`: all defaults."""
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
     lidar_odometry: LidarOdometryParameters | None = None

@@ -10,6 +10,8 @@ from twin.models.description import Link, RobotDescription
 from twin.models.kinematics import ONE_DOF
 from twin.models.sensors import SENSORS, plugin_of
 from twin.models.specs import CameraSpec, SensorSpec
+from twin.models.urdf.batteries import ELEMENTS as OF_BATTERIES
+from twin.models.urdf.batteries import IN_ANY_CASE, batteries, is_battery
 from twin.models.urdf.cameras import CAMERA
 from twin.models.urdf.document import Element
 from twin.models.urdf.drives import CONTROLLER, LEFT, RIGHT, TORQUES, is_drive, library_of
@@ -153,6 +155,8 @@ def gazebo_fate(element: Element, description: RobotDescription) -> Fate:
 
 
 def _plugin(element: Element, plugin: Element) -> Fate:
+    if is_battery(plugin):
+        return _battery(element, plugin)
     if not is_drive(plugin):
         return "dropped", "the plugin is not simulated"
     if element is plugin:
@@ -164,6 +168,21 @@ def _plugin(element: Element, plugin: Element) -> Fate:
     if element.tag in CONTROLLER:
         return "dropped", "the drive controller's; not part of the MJCF"
     return "dropped", "the plugin's own business"
+
+
+def _battery(element: Element, plugin: Element) -> Fate:
+    """Return the fate of a battery's plugin, or of what is in it: MuJoCo has none, but runs do."""
+    if next(other for other in batteries(plugin.getroottree().getroot())) is not plugin:
+        return "dropped", "the first battery of the robot counts"
+    if element is plugin:
+        return "dropped", "MuJoCo has no batteries; twin run drains it, and publishes battery_state"
+    if element.tag in IN_ANY_CASE:
+        return "dropped", "charge is counted like that in any case"
+    if element.tag not in OF_BATTERIES:
+        return "dropped", "the plugin's own business"
+    if plugin.find(element.tag) is not element:
+        return "dropped", f"the first <{element.tag}> counts"
+    return "dropped", f"the battery's; {ELSEWHERE}"
 
 
 def _of_link(element: Element, path: str, gazebo: Element, description: RobotDescription) -> Fate:

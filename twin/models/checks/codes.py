@@ -42,6 +42,7 @@ ERRORS: Mapping[str, str] = MappingProxyType(
         "outside-path": "keep files in the robot's folder or package, or give --allow-path DIR",
         "bad-friction": "give a coefficient of at least 0",
         "bad-drive": "complete the drive plugin",
+        "bad-battery": "complete the battery plugin",
         "bad-command": "correct <ros2_control>",
         "bad-sensor": "complete the <sensor>",
         "massless": "give it an <inertial>, or make the joint above it fixed",

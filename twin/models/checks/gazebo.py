@@ -8,6 +8,7 @@ from twin.errors import nearest
 from twin.models.checks.diagnostic import Diagnostic, finding, finding_in, read_source
 from twin.models.description import RobotDescription
 from twin.models.sensors import SENSORS, plugin_of
+from twin.models.urdf.batteries import ELEMENTS, IN_ANY_CASE, batteries, is_battery
 from twin.models.urdf.cameras import CAMERA, lenses
 from twin.models.urdf.commands import HARDWARE, INTERFACES, command_interface, transmissions
 from twin.models.urdf.document import Element, Report, first
@@ -68,11 +69,28 @@ def _unknown_reference(element: Element, name: str, description: RobotDescriptio
 
 def _plugin(plugin: Element) -> Iterator[Found]:
     library, name = library_of(plugin), plugin.get("name", "")
-    if is_drive(plugin) or library == PLUGIN_IMU or library.endswith((*OWN_PLUGINS, *WORLD_PLUGINS)):
+    if is_battery(plugin):
+        yield from _battery(plugin)
+        return
+    if is_drive(plugin) or library == PLUGIN_IMU:
+        return
+    if library.endswith((*OWN_PLUGINS, *WORLD_PLUGINS)):
         return
     what = name.rpartition("::")[2] if "::" in name else (library or name)
     fix = "drives are DiffDrive and skid steer; give joints a <command_interface>, followers a <mimic>"
     yield "not-simulated", plugin, f"plugin '{what}' is not simulated", fix
+
+
+def _battery(plugin: Element) -> Iterator[Found]:
+    if next(batteries(plugin.getroottree().getroot())) is not plugin:
+        fix = "leave the one that powers the robot"
+        yield "not-simulated", plugin, "another battery plugin stands before; the first counts", fix
+        return
+    for child in plugin.iterchildren("*"):
+        if child.tag not in (*ELEMENTS, *IN_ANY_CASE):
+            message = f"<{child.tag}> of the battery plugin has no effect"
+            fix = "docks that are chargers charge it, and its load is always on; see docs/robots.md"
+            yield "not-simulated", child, message, fix
 
 
 def _sensor(sensor: Element, link: str, description: RobotDescription) -> Iterator[Found]:

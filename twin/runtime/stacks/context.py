@@ -9,6 +9,7 @@ from twin.bridge.bus import Bus
 from twin.geometry import Pose2
 from twin.navigation.maps.occupancy_map import OccupancyMap
 from twin.scenario.robots import RobotConfig
+from twin.sim.battery import BatteryConfig
 from twin.sim.robot import RobotHandle
 
 
@@ -50,6 +51,7 @@ class StackContext:
     namespace: str
     """'' for a single robot, '/name' among several."""
     layout: Layout = WHOLE
+    battery: BatteryConfig | None = None
 
     @property
     def hardware_namespace(self) -> str:

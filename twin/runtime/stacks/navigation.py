@@ -7,6 +7,7 @@ from dataclasses import replace
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
+from twin.navigation.docking.docks import DockDatabase
 from twin.navigation.plugins import TREE_NODES
 from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
@@ -33,8 +34,8 @@ from twin.warehouse.docks import TOTE_POSES
 
 def build_navigation(
     context: StackContext, config: NavigationConfig, pose: RobotPose, footprint: Array
-) -> BtNavigatorNode:
-    """Create the navigation nodes; return the navigator.
+) -> tuple[BtNavigatorNode, DockDatabase]:
+    """Create the navigation nodes; return the navigator, and where the robot can dock.
 
     Args:
         context: What the robot's nodes are built from.
@@ -105,7 +106,7 @@ def build_navigation(
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)
-    return navigator
+    return navigator, parameters.docking.database
 
 
 def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:

@@ -24,6 +24,8 @@ from twin.runtime.stacks.context import StackContext
 from twin.runtime.stacks.localisation import build_localisation
 
 if TYPE_CHECKING:
+    from twin.navigation.docking.docks import DockDatabase
+    from twin.nodes.battery_state_broadcaster import BatteryStateBroadcasterNode
     from twin.nodes.cameras.camera import CameraPublisher
     from twin.nodes.navigation.bt_navigator import BtNavigatorNode
     from twin.nodes.navigation.localisation.ekf import EkfNode
@@ -49,6 +51,9 @@ class RobotStack:
         JointStateBroadcasterNode(
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
+        self.battery = self._build_battery()
+        self.docks: DockDatabase | None = None
+        """Where it can dock, if it navigates."""
         fusion: EkfNodeConfig | None = None
         if context.config.odometry.type != "wheels":
             from twin.nodes.navigation.localisation.ekf import EkfNode
@@ -127,6 +132,17 @@ class RobotStack:
             )
         return node
 
+    def _build_battery(self) -> BatteryStateBroadcasterNode | None:
+        if self.context.battery is None:
+            return None
+        from twin.nodes.battery_state_broadcaster import BatteryStateBroadcasterNode
+
+        return BatteryStateBroadcasterNode(
+            self.context.bus,
+            frame=self.handle.description.root,
+            namespace=self.context.hardware_namespace,
+        )
+
     def _build_autonomy(self) -> None:
         context, pose = self.context, self.robot_pose
         if context.layout.autonomy == "none":
@@ -155,7 +171,7 @@ class RobotStack:
         context, config = self.context, self.context.config.navigation
         assert config is not None
         context.bus.group = context.namespace
-        self.navigator = build_navigation(context, config, self.robot_pose, self.footprint)
+        self.navigator, self.docks = build_navigation(context, config, self.robot_pose, self.footprint)
 
     def _build_arm(self, description: RobotDescription) -> None:
         context, hardware = self.context, self.handle.hardware
