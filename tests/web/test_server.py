@@ -334,6 +334,27 @@ def test_what_goes_to_several_clients_comes_to_each_in_order() -> None:
     assert heard == [[str(number) for number in range(30)]] * 3
 
 
+def test_what_somebody_said_who_has_gone_since_is_not_done() -> None:
+    publishers: list[Any] = []
+
+    def nodes(bus: Bus) -> None:
+        publishers.append(bus.create_node("talker").create_publisher(String, "/chatter", 10))
+
+    with serving(ServerConfig(port=0), nodes=nodes) as rosbridge, connect(rosbridge.server.address) as other:
+        server = rosbridge.server
+        with connect(server.address) as client:
+            topics(client)
+            server.ask(lambda bridge: wait_for(lambda: server.has_urgent))  # it goes before it is heard
+            client.send(json.dumps({"op": "subscribe", "topic": "/chatter"}))
+            client.send(json.dumps({"op": "advertise", "topic": "/ghost", "type": "std_msgs/String"}))
+        other.send(json.dumps({"op": "subscribe", "topic": "/chatter"}))
+        found = topics(other)["values"]["topics"]
+        server.ask(lambda bridge: publishers[0].publish(String("x")))
+        assert json.loads(other.recv(timeout=60.0))["msg"] == {"data": "x"}
+        assert "/ghost" not in found
+        assert len(server.recipients) == 1
+
+
 def test_all_that_waits_for_a_client_goes_out_in_one_write() -> None:
     protocol, written = ServerProtocol(), []
     protocol.state = State.OPEN

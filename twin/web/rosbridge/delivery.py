@@ -17,6 +17,8 @@ _BATCH_BYTES = 65_536
 """Written at once; a client of which that much has not gone out is waited for."""
 _EVERY_S = 0.01
 """Deliveries are no closer [s]: what comes in between goes out together."""
+_MOST_POSTED = 20_000
+"""Frames between two deliveries; the oldest give way where the loop gets no time."""
 
 
 class Delivery:
@@ -30,7 +32,7 @@ class Delivery:
     def __init__(self, loop: asyncio.AbstractEventLoop, stalled_s: float) -> None:
         """Deliver in a loop; a client that reads nothing for `stalled_s` is disconnected."""
         self._loop, self._stalled_s = loop, stalled_s
-        self._posted: deque[tuple[Frame, str | None, Sequence[Recipient]]] = deque()
+        self._posted: deque[tuple[Frame, str | None, Sequence[Recipient]]] = deque(maxlen=_MOST_POSTED)
         self._is_called = False
         self._last_s = 0.0
 
@@ -48,8 +50,9 @@ class Delivery:
             self._is_called = True
             try:
                 self._loop.call_soon_threadsafe(self._deliver)
-            except RuntimeError:
-                return  # the server has ended
+            except RuntimeError:  # the server has ended
+                self._posted.clear()
+                self._is_called = False
 
     def _deliver(self) -> None:
         now_s = self._loop.time()

@@ -36,8 +36,8 @@ def past_values(
     if not (math.isfinite(seconds) and seconds > 0.0 and math.isfinite(every) and every >= 0.0):
         raise BridgeError(f"seconds {seconds:g} and every {every:g} are no times; valid: 30 and 0.05")
     form = codec(types.get(typename))
-    gap_ns = round(max(every, seconds / _MOST) * _NS)
-    start_ns = max(0, until_ns - round(min(seconds * _NS, 2.0**63)))
+    start_ns = max(bag.info.start_ns, until_ns - round(min(seconds * _NS, 2.0**63)))
+    gap_ns = max(round(min(every, 1e9) * _NS), (until_ns - start_ns) // _MOST)
     times, values, next_ns = [], [], start_ns
     for message in bag.messages([topic], start_ns, until_ns):
         if message.log_ns >= next_ns:

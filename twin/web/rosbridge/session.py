@@ -58,6 +58,7 @@ class Session:
         self._level = _LEVELS.index("error")
         self._fragments = Fragments(bridge.limits.message_bytes)
         self._number = 0
+        self._is_over = False
         self._refused: dict[tuple[str, str], float] = {}
         self._ops: dict[str, Callable[[Message], None]] = {
             "advertise": self._advertise,
@@ -83,6 +84,8 @@ class Session:
 
     def handle(self, message: Message) -> None:
         """Do what a message says; what is wrong with it becomes a `status` for the client."""
+        if self._is_over:  # that it went overtakes what it had said before
+            return
         key = message.get("id")
         try:
             op = _text(message, "op")
@@ -124,7 +127,8 @@ class Session:
             self.audit(op, target, {"refused": why})
 
     def close(self) -> None:
-        """End all that the client had. Harmless when repeated."""
+        """End all that the client had, and do no more of what it said. Harmless when repeated."""
+        self._is_over = True
         self._bridge.leave(self)
 
     def _advertise(self, message: Message) -> None:

@@ -105,7 +105,7 @@ class Source:
 
     def sort_anew(self) -> None:
         """Take note that somebody came, went, or wants the topic in another way."""
-        self._others = None
+        self._crowds, self._others = (), None
 
     def _sort(self) -> None:
         alike: dict[Any, list[Session]] = {}
