@@ -18,6 +18,7 @@ from twin.models.catalogue import resolve
 from twin.runtime.open_run import OpenRun
 from twin.runtime.open_run import run as run_whole
 from twin.runtime.run import Run
+from twin.runtime.stacks.context import Layout
 from twin.scenario.schema import Scenario, load
 
 MakeScenario = Callable[[str], Scenario]
@@ -102,7 +103,7 @@ def test_it_tells_its_state_once_a_second(scenario: MakeScenario, make_run: Make
     assert last.capacity == last.design_capacity == pytest.approx(0.002)
     assert last.percentage == pytest.approx(last.charge / last.capacity)
     assert 0.4 < last.percentage < 0.75
-    assert last.voltage == pytest.approx(22.0 + 4.0 * last.percentage + 0.05 * last.current, abs=1e-3)
+    assert last.voltage == pytest.approx(20.4 + 3.6 * last.percentage + 0.05 * last.current, abs=1e-3)
     assert math.isnan(last.temperature)
     assert len(last.cell_voltage) == 0
 
@@ -110,7 +111,7 @@ def test_it_tells_its_state_once_a_second(scenario: MakeScenario, make_run: Make
 def test_driving_costs_more_than_standing(scenario: MakeScenario, make_run: MakeRun) -> None:
     stood, drove = (finish(make_run(scenario(drive("{}", speed=v)))) for v in ("0 m/s", "0.3 m/s"))
     lag = math.exp(-2.0)  # of what is drawn since the start with tau 1 s
-    assert 72_000.0 - charge(stood) == pytest.approx(20.0 / 26.0 * (2.0 - (1.0 - lag)), rel=0.02)
+    assert 72_000.0 - charge(stood) == pytest.approx(20.0 / 24.0 * (2.0 - (1.0 - lag)), rel=0.02)
     work_J = drove.world.work("diff_bot")
     assert work_J > 0.05
     more = charge(stood) - charge(drove)
@@ -156,6 +157,24 @@ def test_docking_by_the_batterys_status_succeeds_because_it_charges(
     charging = [m for m in told if m.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_CHARGING]
     assert bool(charging) is charges
     assert not charges or charging[-1].current > 0.5
+
+
+def test_an_empty_robot_whose_autonomy_is_elsewhere_is_charged_and_has_power_from_one_percent_on(
+    scenario: MakeScenario, make_run: MakeRun
+) -> None:
+    text = DOCK.format(charges="true").replace("duration: 40", "duration: 3").replace("x: 0.1", "x: 0.9")
+    text = text.replace("initial_charge: 10 Ah", "initial_charge: 0 Ah, charging_time: 36 s, power_load: 0 W")
+    run = make_run(scenario(text), layout=Layout(autonomy="none"))
+    hardware, battery = run.world.robots["diff_bot"].hardware, run.batteries["diff_bot"].battery
+    told = states(run)
+    off: list[float] = []
+    while not run.over:
+        run.tick()
+        if hardware.strongest("wheel_left_joint") == 0.0:
+            off.append(battery.share)
+    assert 0.005 < max(off) < 0.01 < battery.share
+    assert off == sorted(off), "once it is on it stays on"
+    assert told[-1].power_supply_status == BatteryState.POWER_SUPPLY_STATUS_CHARGING
 
 
 def test_who_only_passes_a_charger_is_not_charged(scenario: MakeScenario, make_run: MakeRun) -> None:
@@ -227,8 +246,8 @@ def test_a_wrong_value_is_one_sentence_with_its_line(
 def test_a_file_with_gazebos_plugin_brings_one_and_the_scenario_may_change_it(
     tmp_path: Path, make_run: MakeRun
 ) -> None:
-    plugin = """<gazebo><plugin filename="gz-sim-linearbattery-plugin-system"
-      name="gz::sim::systems::LinearBattery"><battery_name>pack</battery_name><voltage>12</voltage>
+    plugin = """<gazebo><plugin filename="gz-sim-linearbatteryplugin-system"
+      name="gz::sim::systems::LinearBatteryPlugin"><battery_name>pack</battery_name><voltage>12</voltage>
       <capacity>2</capacity><power_load>6</power_load></plugin></gazebo></robot>"""
     source = resolve("diff_bot")
     text = source.read_text("utf-8").replace("</robot>", plugin).replace("../", f"{source.parents[1]}/")

@@ -9,7 +9,8 @@ import pytest
 from twin.sim.battery import Battery, BatteryConfig, Supply
 
 TICK_NS = 20_000_000
-SHORT = BatteryConfig(capacity=360.0, resistance=0.06, smooth_current_tau=2.0)
+VOLTAGES = {"open_circuit_voltage_constant_coef": 26.0, "open_circuit_voltage_linear_coef": -4.0}
+SHORT = BatteryConfig(capacity=360.0, resistance=0.06, smooth_current_tau=2.0, **VOLTAGES)
 """0.1 Ah"""
 
 
@@ -37,7 +38,9 @@ def test_it_falls_as_gazebos_does() -> None:
 def test_a_constant_load_takes_its_energy() -> None:
     """Without resistance and lag the energy of the charge is the integral of voltage over it."""
     battery = run(
-        Battery(BatteryConfig(capacity=360.0, resistance=0.0, smooth_current_tau=0.02)), 100.0, 30.0
+        Battery(BatteryConfig(capacity=360.0, resistance=0.0, smooth_current_tau=0.02, **VOLTAGES)),
+        100.0,
+        30.0,
     )
     e0, e1, left = 26.0, -4.0, battery.share
     given = 360.0 * ((e0 + e1) * (1.0 - left) - e1 * (1.0 - left**2) / 2.0)
@@ -64,10 +67,29 @@ def test_a_charger_fills_it_in_its_time_and_then_carries_the_load() -> None:
 
 
 def test_what_it_cannot_deliver_is_not_delivered() -> None:
-    battery = run(Battery(BatteryConfig(capacity=3.6e6, resistance=1.0)), 20.0, 1e9)
+    battery = run(Battery(BatteryConfig(capacity=3.6e6, resistance=1.0, **VOLTAGES)), 20.0, 1e9)
     assert battery.voltage >= 0.49 * 26.0
     assert battery.current == pytest.approx(13.0, rel=0.01), "half of the open-circuit voltage over 1 Ω"
     assert math.isfinite(battery.charge)
+
+
+def test_a_charger_does_not_drive_its_voltage_anywhere() -> None:
+    config = BatteryConfig(capacity=72_000.0, initial_charge=0.0, resistance=5.0, charging_time=3600.0)
+    assert run(Battery(config), 10.0, 0.0, charges=True).voltage <= 1.5 * 24.0
+
+
+def test_it_neither_gives_nor_takes_once_nothing_is_connected() -> None:
+    config = BatteryConfig(initial_charge=36_000.0)
+    battery = run(Battery(config), 5.0, 0.0, charges=True)
+    assert battery.supply is Supply.CHARGING
+    run(battery, 20.0, 0.0)
+    assert (battery.current, battery.supply) == (0.0, Supply.IDLE)
+
+
+def test_its_voltages_follow_from_the_one_that_is_given() -> None:
+    config = BatteryConfig(voltage=12.0)
+    assert (config.open_circuit(1.0), config.open_circuit(0.0)) == (12.0, pytest.approx(10.2))
+    assert run(Battery(config), 1.0, 0.0).voltage == 12.0
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ class DriveSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class BatterySpec:
-    """A battery, from the LinearBattery plugin in `<gazebo>`; what None is, the file does not say."""
+    """A battery, from the LinearBatteryPlugin in `<gazebo>`; what None is, the file does not say."""
 
     battery_name: str
     voltage: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.docking.docks import DockDatabase
@@ -15,6 +15,8 @@ from twin.sim.world import World
 
 _TURNED = math.radians(20.0)
 """Contacts of a charger touch up to such an angle; docking ends far below it."""
+_ENOUGH = 0.01
+"""Share of its capacity from which on an empty battery powers motors again."""
 _STANDS = 0.02
 """A robot that is slower than this [m/s] stands."""
 
@@ -34,7 +36,7 @@ class OnBoardBattery:
         config: BatteryConfig,
         *,
         base: str,
-        chargers: Callable[[], Sequence[Pose2]],
+        chargers: Sequence[Pose2],
     ) -> None:
         """Bind to a world before its first step.
 
@@ -44,7 +46,7 @@ class OnBoardBattery:
             node: What tells of it.
             config: Of the battery.
             base: The link that stands at a dock's pose.
-            chargers: Returns those poses.
+            chargers: Those poses.
         """
         world.measure_work()
         self.battery = Battery(config)
@@ -75,9 +77,9 @@ class OnBoardBattery:
 
     def _switch(self) -> None:
         """Take the motors' power while the battery is empty, as the fault `flat_battery` does."""
-        if self.battery.is_empty is self._is_off:
+        if self._is_off == (self.battery.is_empty or (self._is_off and self.battery.share < _ENOUGH)):
             return
-        self._is_off, hardware = self.battery.is_empty, self._handle.hardware
+        self._is_off, hardware = not self._is_off, self._handle.hardware
         for joint in hardware.commanded_joints:
             hardware.weaken(joint, 0.0 if self._is_off else None, self)
         log = self._node.node.get_logger()
@@ -87,15 +89,14 @@ class OnBoardBattery:
             log.info("the battery is being charged: motors are on")
 
     def _stands_at_charger(self, step_ns: int) -> bool:
-        chargers = self._chargers()
-        if not chargers:
+        if not self._chargers:
             return False
         place, before = self._world.pose(self._base).to_pose2(), self._place
         self._place = place
         reach = self.battery.config.charger_reach
         return place.distance(before) < _STANDS * step_ns * 1e-9 and any(
             place.distance(dock) <= reach and abs(wrap_angle(place.yaw - dock.yaw)) <= _TURNED
-            for dock in chargers
+            for dock in self._chargers
         )
 
 

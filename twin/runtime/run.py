@@ -62,8 +62,6 @@ class Run:
             from twin.runtime.topics import watch_topics
 
             watch_topics(self.bus, self.checks)
-        self.batteries = _batteries(self.world, parts.stacks)
-        """By robot."""
         self._sink = sink
         stacks = parts.stacks.values()
         due: list[Due] = [
@@ -87,6 +85,8 @@ class Run:
             parts.comers,
         )
         self.faults: FaultSchedule | None = self._schedule_faults() if scenario.faults else None
+        self.batteries = _batteries(self.world, parts.stacks)  # after faults, which ask what motors can do
+        """By robot."""
         self._phases = tuple(getattr(self, phase) for phase in self.PHASES)
         self._end_ns = round(scenario.duration * 1e9)
         """When the run ends, at the latest."""
@@ -240,25 +240,21 @@ class Run:
 
 
 def _batteries(world: World, stacks: Mapping[str, RobotStack]) -> dict[str, OnBoardBattery]:
-    """Return the batteries of the robots that have one; docks of any robot are in the way of all."""
-    found: dict[str, OnBoardBattery] = {}
-    for name, stack in stacks.items():
-        config, node = stack.context.battery, stack.battery
-        if config is None or node is None:
-            continue
-        from twin.runtime.on_board_battery import OnBoardBattery, charger_poses
+    """Return the batteries of the robots that have one; any robot's charger charges them."""
+    if all(stack.battery is None for stack in stacks.values()):
+        return {}
+    from twin.runtime.on_board_battery import OnBoardBattery, charger_poses
 
-        found[name] = OnBoardBattery(
+    chargers = [pose for stack in stacks.values() for pose in charger_poses(stack.docks(), stack.frames.map)]
+    return {
+        name: OnBoardBattery(
             world,
             stack.handle,
-            node,
-            config,
+            stack.battery,
+            stack.context.battery,
             base=stack.frames.base,
-            chargers=lambda: [
-                pose
-                for each in stacks.values()
-                if each.docks is not None
-                for pose in charger_poses(each.docks, each.frames.map)
-            ],
+            chargers=chargers,
         )
-    return found
+        for name, stack in stacks.items()
+        if stack.battery is not None and stack.context.battery is not None
+    }

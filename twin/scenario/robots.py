@@ -47,8 +47,8 @@ class RobotConfig(StrictModel):
     emergency_deceleration: Annotated[MetresPerSecondSquared, Positive] = 3.0
     """Of its base, when its [emergency stop](guard.md#in-a-run) is pressed."""
     battery: BatteryParameters | None = None
-    """What [powers](robots.md#batteries) it; absent: what its file says, else nothing that could run out,
-    `{}`: all defaults."""
+    """What [powers](robots.md#batteries) it, over what its file says; absent: that alone, else nothing that
+    could run out."""
     odometry: Odometry = WheelOdometry(type="wheels")
     """Who publishes odom → base; absent: the wheels' controller."""
     lidar_odometry: LidarOdometryParameters | None = None

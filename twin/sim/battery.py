@@ -3,7 +3,7 @@
 Open-circuit voltage, inner resistance, smoothing of the current and all names but `charger_reach` and
 `update_rate` are those of gz-sim's LinearBatteryPlugin, with its `fix_issue_225`. Different: the motors' work
 counts beside the constant load; a battery is charged until it is full (there: 90 %); a load that it cannot
-deliver is not delivered, so that its voltage never falls below half of the open-circuit one.
+deliver is not delivered, so that its voltage stays between half and one and a half of the open-circuit one.
 """
 
 from __future__ import annotations
@@ -14,6 +14,10 @@ from typing import Annotated
 
 from twin.parameters import Coulombs, Hertz, Interval, Metres, NotNegative, Ohms, Seconds, Volts, Watts
 
+_NOTHING = 1e-6
+"""A current that is less [A] and only lags behind none is none."""
+_FALLS = -0.15
+"""Of the open-circuit voltage until a battery is empty, if nobody says how much."""
 _LEAST = 0.1
 """Open-circuit voltage of any battery [V], empty ones too: nothing is divided by less."""
 
@@ -26,10 +30,10 @@ class BatteryConfig:
     """What `battery_state` tells as its location."""
     voltage: Annotated[Volts, Interval(ge=0.1, le=1e4)] = 24.0
     """At the start, before any current flows."""
-    open_circuit_voltage_constant_coef: Annotated[Volts, Interval(ge=0.1, le=1e4)] = 26.0
-    """Without load when it is full."""
-    open_circuit_voltage_linear_coef: Annotated[Volts, Interval(ge=-1e4, le=1e4)] = -4.0
-    """By how much more when it is empty; usually negative."""
+    open_circuit_voltage_constant_coef: Annotated[Volts, Interval(ge=0.1, le=1e4)] | None = None
+    """Without load when it is full; absent: `voltage`."""
+    open_circuit_voltage_linear_coef: Annotated[Volts, Interval(ge=-1e4, le=1e4)] | None = None
+    """By how much more when it is empty, usually negative; absent: 15 % of the former less."""
     capacity: Annotated[Coulombs, Interval(ge=3.6, le=3.6e9)] = 72_000.0
     """Charge when it is full, such as `20 Ah`."""
     initial_charge: Annotated[Coulombs, NotNegative] | None = None
@@ -55,12 +59,18 @@ class BatteryConfig:
         if self.initial_charge is not None and self.initial_charge > self.capacity:
             most, given = self.capacity / 3600.0, self.initial_charge / 3600.0
             raise ValueError(f"initial_charge must be at most the capacity, {most:g} Ah, not {given:g} Ah")
-        empty = self.open_circuit_voltage_constant_coef + self.open_circuit_voltage_linear_coef
+        empty = self.open_circuit(0.0)
         if empty < _LEAST:
             raise ValueError(
                 f"open_circuit_voltage_linear_coef must leave an empty battery {_LEAST:g} V or more, not "
                 f"{empty:g} V"
             )
+
+    def open_circuit(self, share: float) -> float:
+        """Return the voltage without load [V] when so much of the capacity is left, 0 to 1."""
+        constant, linear = self.open_circuit_voltage_constant_coef, self.open_circuit_voltage_linear_coef
+        full = self.voltage if constant is None else constant
+        return full + (_FALLS * full if linear is None else linear) * (1.0 - share)
 
 
 class Supply(Enum):
@@ -115,12 +125,15 @@ class Battery:
         config, seconds = self.config, step_ns * 1e-9
         drawn = self._drawn(load, charges=charges)
         self.current += min(seconds / config.smooth_current_tau, 1.0) * (drawn - self.current)
+        if drawn == 0.0 and abs(self.current) < _NOTHING:
+            self.current = 0.0
         left = self.charge - seconds * self.current
         self.charge = min(max(left, 0.0), config.capacity)
         if self.charge != left:  # it gives no more, or takes no more
             self.current = 0.0
-        sags = self._open_circuit - config.resistance * self.current
-        self.voltage = max(sags, 0.5 * self._open_circuit)
+        without_load = self._open_circuit
+        sags = without_load - config.resistance * self.current
+        self.voltage = min(max(sags, 0.5 * without_load), 1.5 * without_load)
 
     def _drawn(self, load: float, *, charges: bool) -> float:
         """Return the current that load and charger ask for [A]."""
@@ -137,6 +150,4 @@ class Battery:
     @property
     def _open_circuit(self) -> float:
         """Its voltage without load [V]."""
-        config = self.config
-        falls = config.open_circuit_voltage_linear_coef * (1.0 - self.share)
-        return config.open_circuit_voltage_constant_coef + falls
+        return self.config.open_circuit(self.share)

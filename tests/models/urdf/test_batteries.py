@@ -1,4 +1,4 @@
-"""The LinearBattery plugin of new Gazebo: read, told of, or refused in a sentence with its line."""
+"""The LinearBatteryPlugin of new Gazebo: read, told of, or refused in a sentence with its line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from twin.models.checks import check
 from twin.models.loader import load, parse_urdf
 from twin.models.specs import BatterySpec
 
-NEW = "filename='gz-sim-linearbattery-plugin-system' name='gz::sim::systems::LinearBattery'"
+NEW = "filename='gz-sim-linearbatteryplugin-system' name='gz::sim::systems::LinearBatteryPlugin'"
+"""As in gz-sim's tutorial on batteries."""
 GIVEN = """<battery_name>pack</battery_name><voltage>12.592</voltage>
 <open_circuit_voltage_constant_coef>12.694</open_circuit_voltage_constant_coef>
 <open_circuit_voltage_linear_coef>-3.1424</open_circuit_voltage_linear_coef>
@@ -49,7 +50,7 @@ def test_all_that_it_says_is_read_in_si() -> None:
 @pytest.mark.parametrize(
     "kind",
     [
-        "filename='libignition-gazebo-linearbattery-plugin-system.so' name='x'",
+        "filename='libignition-gazebo-linearbatteryplugin-system.so' name='x'",
         "filename='y' name='ignition::gazebo::systems::LinearBatteryPlugin'",
     ],
 )
@@ -62,6 +63,15 @@ def test_every_spelling(kind: str) -> None:
 def test_a_whole_plugin_is_no_news_to_check() -> None:
     description = parse_urdf(robot(GIVEN), Path("r.urdf"))
     assert "not-simulated" not in [found.code for found in check(description)]
+
+
+def test_all_that_is_wrong_is_told_at_once() -> None:
+    wrong = "<voltage>12</voltage><capacity>2</capacity><initial_charge>5</initial_charge>"
+    wrong += "<resistance>-1</resistance><enable_recharge>true</enable_recharge>"
+    with pytest.raises(ModelError) as told:
+        parse_urdf(robot(wrong), Path("r.urdf"))
+    for words in ("initial_charge 5 Ah", "resistance -1", "needs <charging_time>"):
+        assert words in str(told.value)
 
 
 def test_no_other_plugin_is_a_battery() -> None:

@@ -172,7 +172,7 @@ def _plugin(element: Element, plugin: Element) -> Fate:
 
 def _battery(element: Element, plugin: Element) -> Fate:
     """Return the fate of a battery's plugin, or of what is in it: MuJoCo has none, but runs do."""
-    if next(other for other in batteries(plugin.getroottree().getroot())) is not plugin:
+    if next(batteries(plugin.getroottree().getroot())) is not plugin:
         return "dropped", "the first battery of the robot counts"
     if element is plugin:
         return "dropped", "MuJoCo has no batteries; twin run drains it, and publishes battery_state"

@@ -1,4 +1,4 @@
-"""The battery of a robot, from the LinearBattery plugin of new Gazebo.
+"""The battery of a robot, from the LinearBatteryPlugin of new Gazebo.
 
 Element names and units: gz-sim's LinearBatteryPlugin system; charges are in Ah there, times of charging in h.
 """
@@ -13,8 +13,8 @@ from twin.models.urdf.document import Element, Report, text_of
 from twin.models.urdf.drives import library_of
 from twin.models.urdf.gazebo import flag_in, value_of
 
-LIBRARIES = ("gz-sim-linearbattery-plugin-system", "ignition-gazebo-linearbattery-plugin-system")
-CLASSES = ("::systems::LinearBattery", "::systems::LinearBatteryPlugin")
+LIBRARIES = ("gz-sim-linearbatteryplugin-system", "ignition-gazebo-linearbatteryplugin-system")
+CLASS = "::systems::LinearBatteryPlugin"
 HOUR = 3600.0
 """[s]; and an Ah in [C]"""
 RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
@@ -50,20 +50,20 @@ def read_battery(root: Element, report: Report) -> BatterySpec | None:
     for name in needed:
         if plugin.find(name) is None:
             _wrong(plugin, f"needs <{name}>", report)
-    if len(report.problems) > known:
-        return None
-    voltage, capacity = values["voltage"] or 0.0, values["capacity"] or 0.0
+    voltage, capacity = values["voltage"], values["capacity"]
     charge, hours = values["initial_charge"], values["charging_time"]
     constant = values["open_circuit_voltage_constant_coef"]
     linear = values["open_circuit_voltage_linear_coef"]
-    if charge is not None and charge > capacity:
+    if charge is not None and capacity is not None and charge > capacity:
         message = f"has initial_charge {charge:g} Ah; valid: 0 to its capacity, {capacity:g} Ah"
         _wrong(plugin.find("initial_charge"), message, report)
-    empty = (voltage if constant is None else constant) + (linear or 0.0)
-    if empty < RANGES["voltage"][0]:
+    full = voltage if constant is None else constant
+    if full is not None and (empty := full + (linear or 0.0)) < RANGES["voltage"][0]:
         _wrong(
             plugin, f"leaves an empty battery {empty:g} V; valid: {RANGES['voltage'][0]:g} V or more", report
         )
+    if len(report.problems) > known or voltage is None or capacity is None:
+        return None
     return BatterySpec(
         battery_name=text_of(plugin, "battery_name") or "battery",
         voltage=voltage,
@@ -88,7 +88,7 @@ def batteries(root: Element) -> Iterator[Element]:
 
 def is_battery(plugin: Element) -> bool:
     """Tell whether a plugin is a battery."""
-    return library_of(plugin) in LIBRARIES or str(plugin.get("name", "")).endswith(CLASSES)
+    return library_of(plugin) in LIBRARIES or str(plugin.get("name", "")).endswith(CLASS)
 
 
 def _number(plugin: Element, name: str, report: Report) -> float | None:
@@ -96,6 +96,7 @@ def _number(plugin: Element, name: str, report: Report) -> float | None:
     low, high = RANGES[name]
     if value is not None and not low <= value <= high:
         _wrong(plugin.find(name), f"has {name} {value:g}; valid: {low:g} to {high:g}", report)
+        return None
     return value
 
 

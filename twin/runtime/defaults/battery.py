@@ -27,7 +27,6 @@ def _of_file(spec: BatterySpec) -> BatteryConfig:
     Without coefficients of the open-circuit voltage that is `voltage`, which in Gazebo would be 0 then.
     """
     silent = BatteryConfig(
-        open_circuit_voltage_constant_coef=spec.voltage,
         open_circuit_voltage_linear_coef=0.0,
         resistance=0.0,
         power_load=0.0,

@@ -7,7 +7,6 @@ from dataclasses import replace
 from twin.controllers.velocity_smoother import VelocitySmootherConfig
 from twin.geometry import Array
 from twin.models.specs import DriveSpec
-from twin.navigation.docking.docks import DockDatabase
 from twin.navigation.plugins import TREE_NODES
 from twin.navigation.warm_up import warm_up_controller
 from twin.nodes.navigation.behavior_server import BehaviorServerNode
@@ -18,11 +17,11 @@ from twin.nodes.navigation.costmaps.costmap import CostmapNode
 from twin.nodes.navigation.docking.server import DockingServerNode
 from twin.nodes.navigation.planning.planner_server import PlannerServerNode
 from twin.nodes.navigation.planning.smoother_server import SmootherServerNode
-from twin.nodes.navigation.robot_pose import RobotPose
+from twin.nodes.navigation.robot_pose import Frames, RobotPose
 from twin.nodes.navigation.velocity.velocity_smoother import VelocitySmootherNode
 from twin.nodes.navigation.waypoint_follower import WaypointFollowerNode
 from twin.runtime.defaults.from_description import scan_lidar
-from twin.runtime.defaults.navigation import navigation_parameters
+from twin.runtime.defaults.navigation import NavigationParameters, navigation_parameters
 from twin.runtime.parameter_files.localisation import localisation_nodes
 from twin.runtime.parameter_files.nav2.parameters import monitor_with_file, with_file, with_plugins
 from twin.runtime.stacks.commands import build_commands
@@ -34,8 +33,8 @@ from twin.warehouse.docks import TOTE_POSES
 
 def build_navigation(
     context: StackContext, config: NavigationConfig, pose: RobotPose, footprint: Array
-) -> tuple[BtNavigatorNode, DockDatabase]:
-    """Create the navigation nodes; return the navigator, and where the robot can dock.
+) -> BtNavigatorNode:
+    """Create the navigation nodes; return the navigator.
 
     Args:
         context: What the robot's nodes are built from.
@@ -46,18 +45,8 @@ def build_navigation(
     bus, namespace, drive = context.bus, context.namespace, context.handle.description.drive
     assert drive is not None
     config = with_plugins(config, namespace)
-    localisation, lidar = context.config.localisation, scan_lidar(context.handle.description)
-    parameters = navigation_parameters(
-        config,
-        drive,
-        footprint,
-        pose.frames,
-        mapping=localisation is not None and localisation.type == "slam",
-        scan_rate=None if lidar is None else lidar.rate_hz,
-    )
-    parameters, not_understood = with_file(
-        parameters, config, namespace, localisation_nodes(context.config, namespace)
-    )
+    lidar = scan_lidar(context.handle.description)
+    parameters, not_understood = parameters_of(context, config, pose.frames, footprint)
     period_ns = context.control_period_ns
     limits = _drive_limits(parameters.smoother, drive)
     build_commands(context, monitor_with_file(config, namespace), pose, footprint, limits)
@@ -106,7 +95,33 @@ def build_navigation(
     WaypointFollowerNode(bus, parameters.waypoints, namespace=namespace)
     for sentence in not_understood:
         navigator.node.get_logger().warn(sentence)
-    return navigator, parameters.docking.database
+    return navigator
+
+
+def parameters_of(
+    context: StackContext, config: NavigationConfig, frames: Frames, footprint: Array
+) -> tuple[NavigationParameters, list[str]]:
+    """Return the parameters of the navigation nodes, and sentences on what a file has that is none.
+
+    Args:
+        context: What the robot's nodes are built from; it has a drive.
+        config: What the scenario overrides.
+        frames: Of the robot.
+        footprint: Corners in the base frame, shape (n, 2) [m].
+    """
+    drive, localisation = context.handle.description.drive, context.config.localisation
+    assert drive is not None
+    lidar = scan_lidar(context.handle.description)
+    parameters = navigation_parameters(
+        config,
+        drive,
+        footprint,
+        frames,
+        mapping=localisation is not None and localisation.type == "slam",
+        scan_rate=None if lidar is None else lidar.rate_hz,
+    )
+    names = localisation_nodes(context.config, context.namespace)
+    return with_file(parameters, config, context.namespace, names)
 
 
 def _drive_limits(smoother: VelocitySmootherConfig, drive: DriveSpec) -> VelocitySmootherConfig:

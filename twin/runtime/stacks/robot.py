@@ -52,8 +52,6 @@ class RobotStack:
             bus, handle.hardware, period_ns=2 * context.control_period_ns, namespace=namespace
         )
         self.battery = self._build_battery()
-        self.docks: DockDatabase | None = None
-        """Where it can dock, if it navigates."""
         fusion: EkfNodeConfig | None = None
         if context.config.odometry.type != "wheels":
             from twin.nodes.navigation.localisation.ekf import EkfNode
@@ -171,7 +169,20 @@ class RobotStack:
         context, config = self.context, self.context.config.navigation
         assert config is not None
         context.bus.group = context.namespace
-        self.navigator, self.docks = build_navigation(context, config, self.robot_pose, self.footprint)
+        self.navigator = build_navigation(context, config, self.robot_pose, self.footprint)
+
+    def docks(self) -> DockDatabase:
+        """Return where it can dock, whoever sends it there."""
+        from twin.navigation.docking.docks import DockDatabase
+
+        context, config = self.context, self.context.config.navigation
+        if config is None or self.drive is None:
+            return DockDatabase()
+        from twin.runtime.parameter_files.nav2.parameters import with_plugins
+        from twin.runtime.stacks.navigation import parameters_of
+
+        config = with_plugins(config, context.namespace)
+        return parameters_of(context, config, self.frames, self.footprint)[0].docking.database
 
     def _build_arm(self, description: RobotDescription) -> None:
         context, hardware = self.context, self.handle.hardware

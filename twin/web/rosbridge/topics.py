@@ -110,8 +110,8 @@ class Source:
     def _sort(self) -> None:
         alike: dict[Any, list[Session]] = {}
         for who, flow in self.flows.items():
-            if flow.at_once is not None:
-                alike.setdefault(flow.at_once, []).append(cast("Session", who))  # who watches never is
+            if flow.at_once is not None:  # so it is no Watch, and of a session
+                alike.setdefault(flow.at_once, []).append(cast("Session", who))
         self._crowds = tuple(
             Crowd(self._topic, [self.flows[who] for who in sessions], self._topics.together(sessions))
             for sessions in alike.values()

@@ -43,7 +43,7 @@ export function Plot({ station, t, theme }) {
     const [x, y] = samples.current, now = timeOf(station.clock);
     x.push(Math.max(now, x.at(-1) ?? now)); // its estimate may go back a little
     y.push(chosen.current.split(".").reduce((part, key) => part?.[key], last.current) ?? null);
-    if (x.length > WINDOW) x.shift(), y.shift();
+    while (x.length > WINDOW) x.shift(), y.shift();
     chart.current.setData(samples.current);
   };
   useEffect(() => {
