@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from twin.bridge.msgs import BatteryState
 from twin.geometry import Pose2, wrap_angle
 from twin.navigation.docking.docks import DockDatabase
-from twin.nodes.battery_state_broadcaster import BatteryStateBroadcasterNode
+from twin.nodes.battery_state_broadcaster import BatteryReading, BatteryStateBroadcasterNode
 from twin.periods import next_due, period_of
-from twin.sim.battery import Battery, BatteryConfig
+from twin.sim.battery import Battery, BatteryConfig, Supply
 from twin.sim.robot import RobotHandle
 from twin.sim.world import World
 
@@ -17,6 +18,14 @@ _TURNED = math.radians(20.0)
 """Contacts of a charger touch up to such an angle; docking ends far below it."""
 _ENOUGH = 0.01
 """Share of its capacity from which on an empty battery powers motors again."""
+_AMPERE_HOUR = 3600.0
+"""[C]"""
+_STATUS = {
+    Supply.DISCHARGING: BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+    Supply.CHARGING: BatteryState.POWER_SUPPLY_STATUS_CHARGING,
+    Supply.FULL: BatteryState.POWER_SUPPLY_STATUS_FULL,
+    Supply.IDLE: BatteryState.POWER_SUPPLY_STATUS_NOT_CHARGING,
+}
 _STANDS = 0.02
 """A robot that is slower than this [m/s] stands."""
 
@@ -73,7 +82,7 @@ class OnBoardBattery:
         self._switch()
         if self._now_ns >= self._due_ns:
             self._due_ns = next_due(self._period, self._now_ns)
-            self._node.publish(self.battery)
+            self._node.publish(reading_of(self.battery))
 
     def _switch(self) -> None:
         """Take the motors' power while the battery is empty, as the fault `flat_battery` does."""
@@ -98,6 +107,17 @@ class OnBoardBattery:
             place.distance(dock) <= reach and abs(wrap_angle(place.yaw - dock.yaw)) <= _TURNED
             for dock in self._chargers
         )
+
+
+def reading_of(battery: Battery) -> BatteryReading:
+    """Return what the battery's electronics tell."""
+    return BatteryReading(
+        voltage=battery.voltage,
+        current=0.0 - battery.current,  # never -0
+        charge=battery.charge / _AMPERE_HOUR,
+        capacity=battery.config.capacity / _AMPERE_HOUR,
+        status=_STATUS[battery.supply],
+    )
 
 
 def charger_poses(docks: DockDatabase, frame: str) -> list[Pose2]:

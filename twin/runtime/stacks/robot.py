@@ -137,6 +137,7 @@ class RobotStack:
 
         return BatteryStateBroadcasterNode(
             self.context.bus,
+            name=self.context.battery.battery_name,
             frame=self.handle.description.root,
             namespace=self.context.hardware_namespace,
         )
