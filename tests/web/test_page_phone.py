@@ -41,10 +41,15 @@ class Guarded:
         self.status.publish(DiagnosticArray(header(self.node.now_ns, ""), [status]))
 
 
+BOXES = """() => [...document.querySelectorAll("header > *")]
+    .map((each) => each.getBoundingClientRect()).filter(({ width }) => width).map(({ x, width }) => ({ x, width }))"""
+"""Where the parts of the header are that are seen [pixels]."""
+
+
 def boxes(page: Any, width: int) -> None:
     """Nothing of the header is cut off or lies over something else."""
     page.set_viewport_size({"width": width, "height": 740})
-    shown = [box for each in page.locator("header > *").all() if (box := each.bounding_box())]
+    shown = page.evaluate(BOXES)  # at one time: what is in the header comes and goes
     stop = page.locator("header .stop").bounding_box()
     assert stop["x"] >= 0
     assert stop["x"] + stop["width"] <= width, page.inner_text("header")
