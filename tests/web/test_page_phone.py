@@ -42,7 +42,8 @@ class Guarded:
 
 
 BOXES = """() => [...document.querySelectorAll("header > *")]
-    .map((each) => each.getBoundingClientRect()).filter(({ width }) => width).map(({ x, width }) => ({ x, width }))"""
+    .map((each) => each.getBoundingClientRect()).filter(({ width }) => width)
+    .map(({ x, width }) => ({ x, width }))"""
 """Where the parts of the header are that are seen [pixels]."""
 
 
